@@ -1,0 +1,6 @@
+"""``python -m wayfuse`` is the command ``wayfuse``."""
+
+from wayfuse.cli.main import main
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,1 @@
+"""Arrays, angles, frames, errors, random numbers and the compiler: no algorithm of the field."""

@@ -1,0 +1,35 @@
+"""The one place that knows the compiler.
+
+``@kernel`` compiles a function of arrays and scalars with numba, caches the machine code on disk and releases the
+GIL. Kernels draw no random numbers of their own, take no options or strings and raise nothing: the wrapper
+validates, the kernel trusts. ``fastmath`` stays off, for it assumes that no infinity occurs; `fast_kernel` allows
+the re-association of sums (not the removal of NaN and infinity checks), where a loop is to be vectorised. Set
+``NUMBA_DISABLE_JIT=1`` to run every kernel as the plain Python it also is.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, TypeVar, cast
+
+import numba
+
+__all__ = ["fast_kernel", "inline_kernel", "kernel"]
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+
+def kernel(function: F) -> F:
+    """Compile a kernel (cached on disk, GIL released, IEEE arithmetic)."""
+    return cast("F", numba.njit(cache=True, nogil=True, fastmath=False)(function))
+
+
+def fast_kernel(function: F) -> F:
+    """Compile a kernel whose sums may be re-associated and contracted; NaN and infinity keep their meaning."""
+    flags = {"reassoc", "contract", "arcp", "nsz"}
+    return cast("F", numba.njit(cache=True, nogil=True, fastmath=flags, error_model="numpy")(function))
+
+
+def inline_kernel(function: F) -> F:
+    """Compile a scalar helper that is inlined into the kernels that call it."""
+    return cast("F", numba.njit(cache=True, nogil=True, fastmath=False, inline="always")(function))

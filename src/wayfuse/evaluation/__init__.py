@@ -1,0 +1,1 @@
+"""Truth, errors, intervals, calibration, reports and plots."""

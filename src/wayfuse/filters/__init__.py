@@ -1,0 +1,1 @@
+"""Particles, weights, resampling, the particle filter, fixed-lag smoothing."""

@@ -1,0 +1,1 @@
+"""One file per log or data-set format: bytes to records, nothing guessed."""

@@ -1,0 +1,1 @@
+"""From accelerometer and gyroscope to attitude, steps, step length, heading, standing."""

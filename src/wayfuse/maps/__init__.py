@@ -1,0 +1,1 @@
+"""Sites: floors, walls, walkable space."""

@@ -1,0 +1,1 @@
+"""The glue between one domain and one seam of the filter."""

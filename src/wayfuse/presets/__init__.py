@@ -1,0 +1,1 @@
+"""Ready systems, each on one screen."""

@@ -1,0 +1,1 @@
+"""Scans, surveys and radio maps."""

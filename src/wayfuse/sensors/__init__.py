@@ -1,0 +1,1 @@
+"""Typed records, recordings in time order, and the verdicts on bad data."""
