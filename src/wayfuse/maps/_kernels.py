@@ -1,0 +1,157 @@
+"""Kernels of the wall test. The rule they all follow is stated in `wayfuse.maps.walls`."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from wayfuse.core.jit import inline_kernel, kernel
+
+__all__ = ["brute_one", "build_cells", "crosses_many", "crosses_one", "cut", "fill_clearance", "is_inside"]
+
+
+@inline_kernel
+def cut(px, py, qx, qy, ax, ay, bx, by):  # type: ignore[no-untyped-def]
+    """Whether move p -> q (lower end first) crosses wall a -> b (lower end first)."""
+    ymin, ymax = min(py, qy), max(py, qy)
+    wmin, wmax = min(ay, by), max(ay, by)
+    if not (px <= bx and ax <= qx and ymin <= wmax and wmin <= ymax):
+        return False
+    wx, wy = bx - ax, by - ay
+    if (wx * (py - ay) - wy * (px - ax) > 0.0) == (wx * (qy - ay) - wy * (qx - ax) > 0.0):
+        return False
+    mx, my = qx - px, qy - py
+    return (mx * (ay - py) - my * (ax - px) > 0.0) != (mx * (by - py) - my * (bx - px) > 0.0)
+
+
+@inline_kernel
+def brute_one(x0, y0, x1, y1, walls):  # type: ignore[no-untyped-def]
+    """Whether a move crosses any of the walls (w, 4): the definition."""
+    swap = x0 > x1 or (x0 == x1 and y0 > y1)
+    px, py = (x1, y1) if swap else (x0, y0)
+    qx, qy = (x0, y0) if swap else (x1, y1)
+    hit = False
+    for k in range(walls.shape[0]):
+        if cut(px, py, qx, qy, walls[k, 0], walls[k, 1], walls[k, 2], walls[k, 3]):
+            hit = True
+            break
+    return hit
+
+
+@inline_kernel
+def crosses_one(x0, y0, x1, y1, grid, clearance, start, packed, walls):  # type: ignore[no-untyped-def]
+    """Whether a move crosses any wall, by clearance field and packed cell list; see `WallIndex.arrays`.
+
+    ``grid`` = (origin x, origin y, 1 / clearance cell, metres per unit of clearance, 1 / list cell, longest move).
+    """
+    x0, y0, x1, y1 = np.float64(x0), np.float64(y0), np.float64(x1), np.float64(y1)
+    dx, dy = x1 - x0, y1 - y0
+    length2 = dx * dx + dy * dy
+    hit = False
+    if length2 > grid[5] * grid[5]:
+        hit = brute_one(x0, y0, x1, y1, walls)
+    else:
+        u, v = (x0 - grid[0]) * grid[2], (y0 - grid[1]) * grid[2]
+        # off the grid no wall is within the longest move; NaN fails every comparison and crosses nothing
+        if u >= 0.0 and v >= 0.0 and u < clearance.shape[1] and v < clearance.shape[0]:
+            free = clearance[int(v), int(u)] * grid[3]
+            if not length2 < free * free:
+                cell = int((y0 - grid[1]) * grid[4]) * int(grid[6]) + int((x0 - grid[0]) * grid[4])
+                hit = brute_one(x0, y0, x1, y1, packed[start[cell] : start[cell + 1]])
+    return hit
+
+
+@kernel
+def crosses_many(x0, y0, x1, y1, grid, clearance, start, packed, walls, out):  # type: ignore[no-untyped-def]
+    """`crosses_one` of each of n moves into ``out`` (n,)."""
+    for i in range(len(x0)):
+        out[i] = crosses_one(x0[i], y0[i], x1[i], y1[i], grid, clearance, start, packed, walls)
+
+
+@inline_kernel
+def _box_distance(x0, y0, x1, y1, ax, ay, bx, by):  # type: ignore[no-untyped-def]
+    """Distance of segment a-b from the rectangle (x0, y0)-(x1, y1), 0 where they touch."""
+    # Liang-Barsky: does any part of the segment lie in the rectangle?
+    lo, hi = 0.0, 1.0
+    dx, dy = bx - ax, by - ay
+    inside = True
+    for axis in range(2):
+        d = dx if axis == 0 else dy
+        low = (x0 - ax) if axis == 0 else (y0 - ay)
+        high = (x1 - ax) if axis == 0 else (y1 - ay)
+        if d == 0.0:
+            inside = inside and low <= 0.0 <= high
+        else:
+            t0, t1 = low / d, high / d
+            lo, hi = max(lo, min(t0, t1)), min(hi, max(t0, t1))
+    if inside and lo <= hi:
+        return 0.0
+    # apart: the nearest points are a corner and the segment, or an end and the rectangle
+    best = np.inf
+    length2 = max(dx * dx + dy * dy, 1e-30)
+    for corner in range(4):
+        cx = x0 if corner % 2 == 0 else x1
+        cy = y0 if corner < 2 else y1
+        t = min(1.0, max(0.0, ((cx - ax) * dx + (cy - ay) * dy) / length2))
+        ex, ey = ax + t * dx - cx, ay + t * dy - cy
+        best = min(best, ex * ex + ey * ey)
+    for end in range(2):
+        ex = ax if end == 0 else bx
+        ey = ay if end == 0 else by
+        gx, gy = max(x0 - ex, 0.0, ex - x1), max(y0 - ey, 0.0, ey - y1)
+        best = min(best, gx * gx + gy * gy)
+    return np.sqrt(best)
+
+
+@kernel
+def fill_clearance(walls, origin_x, origin_y, cell, reach, unit, out):  # type: ignore[no-untyped-def]
+    """Lower each cell of ``out`` (ny, nx) to floor(distance to the nearest wall / unit), for walls within reach."""
+    ny, nx = out.shape
+    for k in range(walls.shape[0]):
+        ax, ay, bx, by = walls[k, 0], walls[k, 1], walls[k, 2], walls[k, 3]
+        i0 = max(0, int((min(ax, bx) - reach - origin_x) / cell) - 1)
+        i1 = min(nx, int((max(ax, bx) + reach - origin_x) / cell) + 2)
+        j0 = max(0, int((min(ay, by) - reach - origin_y) / cell) - 1)
+        j1 = min(ny, int((max(ay, by) + reach - origin_y) / cell) + 2)
+        for j in range(j0, j1):
+            y = origin_y + j * cell
+            for i in range(i0, i1):
+                x = origin_x + i * cell
+                d = int(_box_distance(x, y, x + cell, y + cell, ax, ay, bx, by) / unit)
+                if d < out[j, i]:
+                    out[j, i] = d
+
+
+@kernel
+def build_cells(walls, origin_x, origin_y, cell, nx, ny, reach, start, index):  # type: ignore[no-untyped-def]
+    """List the walls within reach of each cell: with ``index`` empty, count into start[c + 1]; else fill it.
+
+    On filling, start[c] must be where cell c begins; it comes back as where it ends.
+    """
+    counting = len(index) == 0
+    for k in range(walls.shape[0]):
+        ax, ay, bx, by = walls[k, 0], walls[k, 1], walls[k, 2], walls[k, 3]
+        i0 = max(0, int((min(ax, bx) - reach - origin_x) / cell) - 1)
+        i1 = min(nx, int((max(ax, bx) + reach - origin_x) / cell) + 2)
+        j0 = max(0, int((min(ay, by) - reach - origin_y) / cell) - 1)
+        j1 = min(ny, int((max(ay, by) + reach - origin_y) / cell) + 2)
+        for j in range(j0, j1):
+            y = origin_y + j * cell
+            for i in range(i0, i1):
+                x = origin_x + i * cell
+                if _box_distance(x, y, x + cell, y + cell, ax, ay, bx, by) <= reach:
+                    c = j * nx + i
+                    if counting:
+                        start[c + 1] += 1
+                    else:
+                        index[start[c]] = k
+                        start[c] += 1
+
+
+@inline_kernel
+def is_inside(x, y, origin_x, origin_y, inverse_cell, mask):  # type: ignore[no-untyped-def]
+    """Whether a place lies in a set cell of a mask (ny, nx); NaN and places off the mask do not."""
+    u, v = (x - origin_x) * inverse_cell, (y - origin_y) * inverse_cell
+    inside = False
+    if u >= 0.0 and v >= 0.0 and u < mask.shape[1] and v < mask.shape[0]:
+        inside = mask[int(v), int(u)] != 0
+    return inside

@@ -1,0 +1,66 @@
+"""Build a floor from its polygons: walls, walkable mask and wall index are derived here, once."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from wayfuse.core.errors import MapError
+from wayfuse.core.frames import GeoAnchor
+from wayfuse.core.types import Array
+from wayfuse.maps.geometry import free_space, normalise_walls, rasterise, ring_walls
+from wayfuse.maps.site import STOREY_HEIGHT, Floor, Polygon, Unit
+from wayfuse.maps.walls import WallIndex
+
+__all__ = ["build_floor", "nominal_elevation"]
+
+
+def nominal_elevation(level: int) -> float:
+    """Elevation (m) of a level where the plan gives none; F1 is 0, and there is no level 0 below it but G."""
+    return STOREY_HEIGHT * (level - 1 if level > 0 else level)
+
+
+def build_floor(
+    name: str,
+    level: int,
+    outline: Sequence[Polygon],
+    units: Sequence[Unit] = (),
+    *,
+    walls: Array | None = None,
+    width: float | None = None,
+    height: float | None = None,
+    elevation: float | None = None,
+    anchor: GeoAnchor | None = None,
+) -> Floor:
+    """Floor of an outline and its units (m).
+
+    Parameters
+    ----------
+    outline, units : valid polygons (see `wayfuse.maps.geometry.clean_polygons`).
+    walls : (w, 4) m; without them every edge of the outline and of a unit is a wall.
+    width, height : extent of the frame; without them the far corner of the outline.
+    elevation : m; without it nominal by level.
+
+    Raises
+    ------
+    MapError : there is no outline.
+    """
+    if not outline:
+        raise MapError(f"floor {name} has no outline", remedy="give at least one polygon")
+    corner = np.max([p.exterior.max(axis=0) for p in outline], axis=0)
+    shapes = [unit.polygon for unit in units]
+    segments = ring_walls([*outline, *shapes]) if walls is None else normalise_walls(walls)
+    return Floor(
+        name=name,
+        level=level,
+        width=float(corner[0]) if width is None else width,
+        height=float(corner[1]) if height is None else height,
+        elevation=nominal_elevation(level) if elevation is None else elevation,
+        outline=tuple(outline),
+        units=tuple(units),
+        walls=segments,
+        walkable=rasterise(free_space(outline, shapes)),
+        wall_index=WallIndex.build(segments),
+        anchor=anchor,
+    )

@@ -1,0 +1,254 @@
+"""A site in a folder: what is drawn as text, what is derived as tables, and a checksum of each.
+
+```
+site.json      name, floors bottom up (level, size, elevation, anchor), provenance, sha256 of every file
+F1.geojson     outline, units and walls of floor F1 in metres of its frame
+F1.npz         walkable mask and wall tables, derived from F1.geojson when the site was built
+```
+A reader needs no geometry library. A file that is missing, damaged, edited or newer than this version is an error
+that names it, never a guess.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import json
+import re
+import zipfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from wayfuse.core.errors import MapError
+from wayfuse.core.frames import GeoAnchor
+from wayfuse.core.types import Array
+from wayfuse.maps.site import Floor, Polygon, Site, Unit
+from wayfuse.maps.walkable import Walkable
+from wayfuse.maps.walls import WallIndex
+
+__all__ = ["FORMAT", "VERSION", "load_site", "save_site"]
+
+FORMAT = "wayfuse-site"
+VERSION = 1
+MANIFEST = "site.json"
+ANEW = "import the site anew with `wayfuse site import`"
+
+
+def save_site(site: Site, folder: Path, *, overwrite: bool = False) -> None:
+    """Write a site; the manifest goes last, so that a folder with one is whole.
+
+    Raises
+    ------
+    MapError : the folder holds something already, and ``overwrite`` is not set or it is not a site.
+    """
+    folder = Path(folder)
+    _make_room(folder, overwrite)
+    entries = []
+    for floor, stem in zip(site.floors, _stems(site.floor_names), strict=True):
+        drawn, derived = _geojson(floor), _tables(floor)
+        (folder / f"{stem}.geojson").write_bytes(drawn)
+        (folder / f"{stem}.npz").write_bytes(derived)
+        entries.append(
+            {
+                "name": floor.name,
+                "level": floor.level,
+                "width": floor.width,
+                "height": floor.height,
+                "elevation": floor.elevation,
+                "anchor": _anchor_entry(floor.anchor),
+                "files": {f"{stem}.geojson": _sha256(drawn), f"{stem}.npz": _sha256(derived)},
+            }
+        )
+    manifest = {
+        "format": FORMAT,
+        "version": VERSION,
+        "name": site.name,
+        "units": "metres of each floor's frame, x east, y north; anchor: (lon, lat) = origin + matrix (x, y)",
+        "floors": entries,
+        "provenance": dict(site.provenance),
+    }
+    text = json.dumps(manifest, indent=1, ensure_ascii=False)
+    (folder / MANIFEST).write_text(text + "\n", encoding="utf-8")
+
+
+def load_site(folder: Path) -> Site:
+    """Read a site that `save_site` wrote.
+
+    Raises
+    ------
+    MapError : no site there, a file missing, damaged or of a newer version; names the file and the remedy.
+    """
+    folder = Path(folder)
+    manifest = _manifest(folder)
+    try:
+        floors = tuple(_floor(folder, entry) for entry in manifest["floors"])
+        return Site(str(manifest["name"]), floors, dict(manifest.get("provenance", {})))
+    except (KeyError, TypeError, ValueError, IndexError, AttributeError) as error:
+        raise MapError(f"damaged: {error!r}", where=folder / MANIFEST, remedy=ANEW) from error
+
+
+def _make_room(folder: Path, overwrite: bool) -> None:
+    if folder.exists() and not folder.is_dir():
+        raise MapError("is a file, not a folder", where=folder, remedy="name another folder")
+    held = sorted(p.name for p in folder.iterdir()) if folder.is_dir() else []
+    if held and MANIFEST not in held:
+        raise MapError(
+            f"holds other files ({held[0]}, ...)", where=folder, remedy="name an empty or new folder"
+        )
+    if held and not overwrite:
+        raise MapError(
+            "holds a site already", where=folder, remedy="name another folder, or give --overwrite"
+        )
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / MANIFEST).unlink(missing_ok=True)
+    for name in held:
+        if name.endswith((".geojson", ".npz")):
+            (folder / name).unlink()
+
+
+def _manifest(folder: Path) -> dict[str, Any]:
+    path = folder / MANIFEST
+    if not folder.is_dir():
+        raise MapError("no such folder", where=folder, remedy="import a site first: `wayfuse site import`")
+    if not path.is_file():
+        raise MapError(f"not a site: it has no {MANIFEST}", where=folder, remedy=ANEW)
+    try:
+        manifest = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise MapError(f"damaged: {error}", where=path, remedy=ANEW) from error
+    if not isinstance(manifest, dict) or manifest.get("format") != FORMAT:
+        raise MapError(f"not a site: its format is not {FORMAT!r}", where=path, remedy=ANEW)
+    version = manifest.get("version")
+    if not isinstance(version, int) or version > VERSION:
+        raise MapError(f"version {version!r}, known up to {VERSION}", where=path, remedy="upgrade wayfuse")
+    return manifest
+
+
+def _stems(names: tuple[str, ...]) -> list[str]:
+    """A file stem per floor: its name where that can be one, unique whatever the case."""
+    stems: list[str] = []
+    for i, name in enumerate(names):
+        stem = re.sub(r"[^0-9A-Za-z_-]+", "_", name) or "floor"
+        taken = {s.casefold() for s in stems} | {"site"}
+        stems.append(stem if stem.casefold() not in taken else f"{stem}_{i}")
+    return stems
+
+
+def _geojson(floor: Floor) -> bytes:
+    features = [_feature("MultiPolygon", [_rings(p) for p in floor.outline], {"kind": "outline"})]
+    features += [
+        _feature("Polygon", _rings(u.polygon), {"kind": "unit", "name": u.name, "category": u.category}, u.id)
+        for u in floor.units
+    ]
+    features.append(_feature("MultiLineString", floor.walls.reshape(-1, 2, 2).tolist(), {"kind": "walls"}))
+    head = '{"type": "FeatureCollection", "coordinates": "metres, x east, y north", "features": [\n'
+    lines = ",\n".join(json.dumps(feature, ensure_ascii=False) for feature in features)
+    return (head + lines + "\n]}\n").encode()
+
+
+def _feature(kind: str, coordinates: Any, properties: dict[str, str], ident: str = "") -> dict[str, Any]:
+    geometry = {"type": kind, "coordinates": coordinates}
+    named = {"id": ident} if ident else {}
+    return {"type": "Feature", **named, "properties": properties, "geometry": geometry}
+
+
+def _rings(polygon: Polygon) -> list[Any]:
+    return [ring.tolist() for ring in polygon.rings]
+
+
+def _tables(floor: Floor) -> bytes:
+    buffer = io.BytesIO()
+    arrays = floor.wall_index.arrays
+    np.savez_compressed(
+        buffer,
+        mask=floor.walkable.mask,
+        mask_frame=np.array([*floor.walkable.origin, floor.walkable.cell]),
+        clearance=arrays.clearance,
+        start=arrays.start,
+        index=floor.wall_index.index,
+    )
+    return buffer.getvalue()
+
+
+def _floor(folder: Path, entry: dict[str, Any]) -> Floor:
+    files: dict[str, str] = entry["files"]
+    drawn_name = next(name for name in [*files, ""] if name.endswith((".geojson", "")))
+    derived_name = str(Path(drawn_name).with_suffix(".npz"))
+    drawn = _checked(folder, drawn_name, files[drawn_name])
+    derived = _checked(folder, derived_name, files[derived_name])
+    outline, units, walls = _parse_geojson(json.loads(drawn))
+    try:
+        with np.load(io.BytesIO(derived), allow_pickle=False) as tables:
+            x, y, cell = tables["mask_frame"].tolist()
+            walkable = Walkable((x, y), cell, tables["mask"])
+            index = WallIndex.from_tables(walls, tables["clearance"], tables["start"], tables["index"])
+    except (OSError, EOFError, zipfile.BadZipFile) as error:
+        raise MapError(f"damaged: {error}", where=folder / derived_name, remedy=ANEW) from error
+    anchor = entry["anchor"]
+    return Floor(
+        name=str(entry["name"]),
+        level=int(entry["level"]),
+        width=float(entry["width"]),
+        height=float(entry["height"]),
+        elevation=float(entry["elevation"]),
+        outline=outline,
+        units=units,
+        walls=walls,
+        walkable=walkable,
+        wall_index=index,
+        anchor=None if anchor is None else _anchor(anchor),
+    )
+
+
+def _checked(folder: Path, name: str, sha256: str) -> bytes:
+    if Path(name).name != name:
+        raise MapError(f"names a file outside its folder: {name!r}", where=folder / MANIFEST, remedy=ANEW)
+    path = folder / name
+    try:
+        content = path.read_bytes()
+    except OSError as error:
+        raise MapError(f"missing or unreadable: {error.strerror}", where=path, remedy=ANEW) from error
+    if _sha256(content) != sha256:
+        raise MapError(f"damaged or edited: its checksum is not that of {MANIFEST}", where=path, remedy=ANEW)
+    return content
+
+
+def _parse_geojson(collection: dict[str, Any]) -> tuple[tuple[Polygon, ...], tuple[Unit, ...], Array]:
+    outline: tuple[Polygon, ...] = ()
+    units: list[Unit] = []
+    walls = np.empty((0, 4))
+    for feature in collection["features"]:
+        properties, coordinates = feature["properties"], feature["geometry"]["coordinates"]
+        match properties["kind"]:
+            case "outline":
+                outline = tuple(_polygon(rings) for rings in coordinates)
+            case "unit":
+                unit = Unit(feature["id"], properties["name"], properties["category"], _polygon(coordinates))
+                units.append(unit)
+            case "walls":
+                walls = np.array(coordinates, dtype=np.float64).reshape(-1, 4)
+    return outline, tuple(units), walls
+
+
+def _polygon(rings: list[Any]) -> Polygon:
+    exterior, *holes = (np.array(ring, dtype=np.float64) for ring in rings)
+    return Polygon(exterior, tuple(holes))
+
+
+def _anchor_entry(anchor: GeoAnchor | None) -> dict[str, Any] | None:
+    return (
+        None
+        if anchor is None
+        else {"origin": list(anchor.origin), "matrix": [list(row) for row in anchor.matrix]}
+    )
+
+
+def _anchor(entry: dict[str, Any]) -> GeoAnchor:
+    (lon, lat), ((a, b), (c, d)) = entry["origin"], entry["matrix"]
+    return GeoAnchor((lon, lat), ((a, b), (c, d)))
+
+
+def _sha256(content: bytes) -> str:
+    return hashlib.sha256(content).hexdigest()
