@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from wayfuse.core.jit import inline_kernel, kernel
+from wayfuse.core.types import Array, BoolArray
 
 __all__ = ["brute_one", "build_cells", "crosses_many", "crosses_one", "cut", "fill_clearance", "is_inside"]
 
 
 @inline_kernel
-def cut(px, py, qx, qy, ax, ay, bx, by):  # type: ignore[no-untyped-def]
+def cut(px: float, py: float, qx: float, qy: float, ax: float, ay: float, bx: float, by: float) -> bool:
     """Whether move p -> q (lower end first) crosses wall a -> b (lower end first)."""
     ymin, ymax = min(py, qy), max(py, qy)
     wmin, wmax = min(ay, by), max(ay, by)
@@ -24,7 +26,7 @@ def cut(px, py, qx, qy, ax, ay, bx, by):  # type: ignore[no-untyped-def]
 
 
 @inline_kernel
-def brute_one(x0, y0, x1, y1, walls):  # type: ignore[no-untyped-def]
+def brute_one(x0: float, y0: float, x1: float, y1: float, walls: Array) -> bool:
     """Whether a move crosses any of the walls (w, 4): the definition."""
     swap = x0 > x1 or (x0 == x1 and y0 > y1)
     px, py = (x1, y1) if swap else (x0, y0)
@@ -38,37 +40,62 @@ def brute_one(x0, y0, x1, y1, walls):  # type: ignore[no-untyped-def]
 
 
 @inline_kernel
-def crosses_one(x0, y0, x1, y1, grid, clearance, start, packed, walls):  # type: ignore[no-untyped-def]
+def crosses_one(
+    x0: float,
+    y0: float,
+    x1: float,
+    y1: float,
+    grid: Array,
+    clearance: NDArray[np.uint8],
+    start: NDArray[np.int32],
+    packed: Array,
+    walls: Array,
+) -> bool:
     """Whether a move crosses any wall, by clearance field and packed cell list; see `WallIndex.arrays`.
 
-    ``grid`` = (origin x, origin y, 1 / clearance cell, metres per unit of clearance, 1 / list cell, longest move).
+    ``grid`` = (origin x, origin y, 1 / clearance cell, metres per unit of clearance, 1 / list cell, longest
+    move, list cells per row).
     """
-    x0, y0, x1, y1 = np.float64(x0), np.float64(y0), np.float64(x1), np.float64(y1)
-    dx, dy = x1 - x0, y1 - y0
+    # float32 moves are widened first, so that they mean the same as in the definition
+    px, py, qx, qy = np.float64(x0), np.float64(y0), np.float64(x1), np.float64(y1)
+    dx, dy = qx - px, qy - py
     length2 = dx * dx + dy * dy
     hit = False
     if length2 > grid[5] * grid[5]:
-        hit = brute_one(x0, y0, x1, y1, walls)
+        hit = brute_one(px, py, qx, qy, walls)
     else:
-        u, v = (x0 - grid[0]) * grid[2], (y0 - grid[1]) * grid[2]
+        u, v = (px - grid[0]) * grid[2], (py - grid[1]) * grid[2]
         # off the grid no wall is within the longest move; NaN fails every comparison and crosses nothing
         if u >= 0.0 and v >= 0.0 and u < clearance.shape[1] and v < clearance.shape[0]:
             free = clearance[int(v), int(u)] * grid[3]
             if not length2 < free * free:
-                cell = int((y0 - grid[1]) * grid[4]) * int(grid[6]) + int((x0 - grid[0]) * grid[4])
-                hit = brute_one(x0, y0, x1, y1, packed[start[cell] : start[cell + 1]])
+                cell = int((py - grid[1]) * grid[4]) * int(grid[6]) + int((px - grid[0]) * grid[4])
+                hit = brute_one(px, py, qx, qy, packed[start[cell] : start[cell + 1]])
     return hit
 
 
 @kernel
-def crosses_many(x0, y0, x1, y1, grid, clearance, start, packed, walls, out):  # type: ignore[no-untyped-def]
+def crosses_many(
+    x0: Array,
+    y0: Array,
+    x1: Array,
+    y1: Array,
+    grid: Array,
+    clearance: NDArray[np.uint8],
+    start: NDArray[np.int32],
+    packed: Array,
+    walls: Array,
+    out: BoolArray,
+) -> None:
     """`crosses_one` of each of n moves into ``out`` (n,)."""
     for i in range(len(x0)):
         out[i] = crosses_one(x0[i], y0[i], x1[i], y1[i], grid, clearance, start, packed, walls)
 
 
 @inline_kernel
-def _box_distance(x0, y0, x1, y1, ax, ay, bx, by):  # type: ignore[no-untyped-def]
+def _box_distance(
+    x0: float, y0: float, x1: float, y1: float, ax: float, ay: float, bx: float, by: float
+) -> float:
     """Distance of segment a-b from the rectangle (x0, y0)-(x1, y1), 0 where they touch."""
     # Liang-Barsky: does any part of the segment lie in the rectangle?
     lo, hi = 0.0, 1.0
@@ -86,7 +113,7 @@ def _box_distance(x0, y0, x1, y1, ax, ay, bx, by):  # type: ignore[no-untyped-de
     if inside and lo <= hi:
         return 0.0
     # apart: the nearest points are a corner and the segment, or an end and the rectangle
-    best = np.inf
+    best: float = np.inf
     length2 = max(dx * dx + dy * dy, 1e-30)
     for corner in range(4):
         cx = x0 if corner % 2 == 0 else x1
@@ -99,12 +126,20 @@ def _box_distance(x0, y0, x1, y1, ax, ay, bx, by):  # type: ignore[no-untyped-de
         ey = ay if end == 0 else by
         gx, gy = max(x0 - ex, 0.0, ex - x1), max(y0 - ey, 0.0, ey - y1)
         best = min(best, gx * gx + gy * gy)
-    return np.sqrt(best)
+    return float(best**0.5)
 
 
 @kernel
-def fill_clearance(walls, origin_x, origin_y, cell, reach, unit, out):  # type: ignore[no-untyped-def]
-    """Lower each cell of ``out`` (ny, nx) to floor(distance to the nearest wall / unit), for walls within reach."""
+def fill_clearance(
+    walls: Array,
+    origin_x: float,
+    origin_y: float,
+    cell: float,
+    reach: float,
+    unit: float,
+    out: NDArray[np.uint8],
+) -> None:
+    """Lower each cell of ``out`` (ny, nx) to floor(distance to the nearest wall / unit), within reach."""
     ny, nx = out.shape
     for k in range(walls.shape[0]):
         ax, ay, bx, by = walls[k, 0], walls[k, 1], walls[k, 2], walls[k, 3]
@@ -117,12 +152,21 @@ def fill_clearance(walls, origin_x, origin_y, cell, reach, unit, out):  # type: 
             for i in range(i0, i1):
                 x = origin_x + i * cell
                 d = int(_box_distance(x, y, x + cell, y + cell, ax, ay, bx, by) / unit)
-                if d < out[j, i]:
-                    out[j, i] = d
+                out[j, i] = min(out[j, i], d)
 
 
 @kernel
-def build_cells(walls, origin_x, origin_y, cell, nx, ny, reach, start, index):  # type: ignore[no-untyped-def]
+def build_cells(
+    walls: Array,
+    origin_x: float,
+    origin_y: float,
+    cell: float,
+    nx: int,
+    ny: int,
+    reach: float,
+    start: NDArray[np.int32],
+    index: NDArray[np.int32],
+) -> None:
     """List the walls within reach of each cell: with ``index`` empty, count into start[c + 1]; else fill it.
 
     On filling, start[c] must be where cell c begins; it comes back as where it ends.
@@ -148,7 +192,9 @@ def build_cells(walls, origin_x, origin_y, cell, nx, ny, reach, start, index):  
 
 
 @inline_kernel
-def is_inside(x, y, origin_x, origin_y, inverse_cell, mask):  # type: ignore[no-untyped-def]
+def is_inside(
+    x: float, y: float, origin_x: float, origin_y: float, inverse_cell: float, mask: NDArray[np.uint8]
+) -> bool:
     """Whether a place lies in a set cell of a mask (ny, nx); NaN and places off the mask do not."""
     u, v = (x - origin_x) * inverse_cell, (y - origin_y) * inverse_cell
     inside = False

@@ -6,7 +6,7 @@ Only importers come here; a saved site is loaded without it.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -14,10 +14,7 @@ from wayfuse.core.types import Array
 from wayfuse.maps.site import Polygon
 from wayfuse.maps.walkable import CELL, WIDENING, Walkable
 
-if TYPE_CHECKING:
-    from shapely import Geometry
-
-__all__ = ["RESOLUTION", "clean_polygons", "free_space", "rasterise", "ring_walls"]
+__all__ = ["RESOLUTION", "clean_polygons", "free_space", "normalise_walls", "rasterise", "ring_walls"]
 
 RESOLUTION = 1e-3  # m, coordinates are rounded to this: finer than any plan, and readable in a file
 NARROWEST = 0.2  # m, a gap between two units narrower than this is a drawing error, not a passage
@@ -38,7 +35,7 @@ def clean_polygons(rings: Sequence[Array]) -> tuple[tuple[Polygon, ...], str]:
     import shapely
 
     rings = [np.round(ring / RESOLUTION) * RESOLUTION for ring in rings]
-    if not len(rings) or any(len(ring) < 3 or not np.all(np.isfinite(ring)) for ring in rings):
+    if not rings or any(len(ring) < 3 or not np.all(np.isfinite(ring)) for ring in rings):
         return (), "fewer than three points, or coordinates that are not numbers"
     drawn = shapely.Polygon(rings[0], [*rings[1:]])
     fault = "" if drawn.is_valid else str(shapely.is_valid_reason(drawn))
@@ -63,21 +60,21 @@ def from_shapely(shape: Any) -> tuple[Polygon, ...]:
     return tuple(found)
 
 
-def _union(polygons: Iterable[Polygon]) -> Geometry:
+def _union(polygons: Iterable[Polygon]) -> Any:
     import shapely
 
     return shapely.union_all([shapely.Polygon(p.exterior, [*p.holes]) for p in polygons])
 
 
-def free_space(outline: Iterable[Polygon], units: Iterable[Polygon]) -> Geometry:
-    """Outline minus units, without slits, widened by `WIDENING`, inside the outline: a shapely geometry (m)."""
-    whole = _union(outline)
+def free_space(outline: Iterable[Polygon], units: Iterable[Polygon]) -> Any:
+    """Outline minus units, without slits, widened by `WIDENING` inside the outline: shapely geometry (m)."""
+    whole: Any = _union(outline)
     free = whole.difference(_union(units))
     opened = free.buffer(-0.5 * NARROWEST, join_style="mitre").buffer(0.5 * NARROWEST + WIDENING)
     return opened.intersection(whole)
 
 
-def rasterise(shape: Geometry, cell: float = CELL) -> Walkable:
+def rasterise(shape: Any, cell: float = CELL) -> Walkable:
     """Mask of the cells whose centre lies in a shapely geometry (m)."""
     import shapely
 
@@ -88,7 +85,8 @@ def rasterise(shape: Geometry, cell: float = CELL) -> Walkable:
     nx, ny = int(np.ceil(x1 / cell)) - i0, int(np.ceil(y1 / cell)) - j0
     shapely.prepare(shape)
     x, y = np.meshgrid((i0 + np.arange(nx) + 0.5) * cell, (j0 + np.arange(ny) + 0.5) * cell)
-    return Walkable((i0 * cell, j0 * cell), cell, shapely.contains_xy(shape, x, y).astype(np.uint8))
+    mask = np.asarray(shapely.contains_xy(shape, x, y), dtype=np.uint8)
+    return Walkable((i0 * cell, j0 * cell), cell, mask)
 
 
 def ring_walls(polygons: Iterable[Polygon]) -> Array:

@@ -1,9 +1,9 @@
 """A site: the floors of a building in metres, each with its outline, units, walls and walkable space.
 
-Every floor has its own frame, for that is what public floor plans come with: x to the east edge and y to the north
-edge of *its* plan. Floors therefore carry their own `GeoAnchor`; `Site.shift` gives the offset between two of them.
-A site is built once by an importer (`wayfuse.maps.build`), saved in a folder and loaded by everything else without a
-geometry library.
+Every floor has its own frame, for that is what public floor plans come with: x to the east edge and y to the
+north edge of *its* plan. Floors therefore carry their own `GeoAnchor`; `Site.shift` gives the offset between
+two of them. A site is built once by an importer (`wayfuse.maps.build`), saved in a folder and loaded by
+everything else without a geometry library.
 """
 
 from __future__ import annotations
@@ -57,9 +57,10 @@ class Unit(NamedTuple):
 class Floor:
     """One floor.
 
-    name : as the plan has it. level : as people count, F1 = 1, B1 = -1; floors are sorted by it.
-    width, height : m, the extent of the frame. elevation : m above F1 (nominal where the plan does not say).
-    outline : outer polygons with their holes. units : closed areas. walls : (w, 4) segments x0, y0, x1, y1 in m.
+    name : as the plan has it. level : as people count, F1 = 1, B1 = -1; floors are sorted by it. width,
+    height : m, the extent of the frame. elevation : m above F1 (nominal where the plan does not say).
+    outline : outer polygons with their holes. units : closed areas. walls : (w, 4) segments x0, y0, x1, y1
+    in m.
     walkable, wall_index : derived tables. anchor : to WGS84, None where the plan has none.
     """
 
@@ -146,10 +147,10 @@ class Site:
         return folded.index(name.casefold())
 
     def shift(self, source: int, target: int) -> Array:
-        """Offset (2,) m to add to a place of floor ``source`` to get the place above or below it on ``target``.
+        """Offset (2,) m to add to a place of floor ``source`` for the place above or below on ``target``.
 
-        Zero where either floor has no anchor. Floors of one site share axes and scale, so a shift is enough (the
-        importer checks it).
+        Zero where either floor has no anchor. Floors of one site share axes and scale, so a shift is enough
+        (the importer checks it).
         """
         a, b = self.floors[source].anchor, self.floors[target].anchor
         if a is None or b is None or source == target:

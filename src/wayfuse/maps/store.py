@@ -5,8 +5,8 @@ site.json      name, floors bottom up (level, size, elevation, anchor), provenan
 F1.geojson     outline, units and walls of floor F1 in metres of its frame
 F1.npz         walkable mask and wall tables, derived from F1.geojson when the site was built
 ```
-A reader needs no geometry library. A file that is missing, damaged, edited or newer than this version is an error
-that names it, never a guess.
+A reader needs no geometry library. A file that is missing, damaged, edited or newer than this version is an
+error that names it, never a guess.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """Walkable space of a floor as a mask of small cells.
 
-The free space (outline minus units) of a plan is as inexact as its drawing, so it is widened by `WIDENING`: a place
-at most that deep in a shop still counts as walkable. The mask is computed once when a site is built (`build_floor`)
-and saved with it.
+The free space (outline minus units) of a plan is as inexact as its drawing, so it is widened by `WIDENING`:
+a place at most that deep in a shop still counts as walkable. The mask is computed once when a site is built
+(`build_floor`) and saved with it.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ WIDENING = 0.3  # m, free space is widened by this: plans are drawn to about 0.1
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Walkable:
-    """Mask of walkable cells: cell (j, i) covers x in origin_x + [i, i+1) cell, y in origin_y + [j, j+1) cell.
+    """Mask of walkable cells: cell (j, i) covers x in origin_x + [i, i + 1) cell, y likewise with j.
 
     origin : (x, y) m. cell : m. mask : (ny, nx) uint8, 1 walkable.
     """
@@ -51,7 +51,7 @@ class Walkable:
     def centres(self) -> Array:
         """(n, 2) m, the centres of the walkable cells, row by row."""
         j, i = np.nonzero(self.mask)
-        return np.asarray(self.origin) + (np.column_stack([i, j]) + 0.5) * self.cell
+        return np.asarray(np.asarray(self.origin) + (np.column_stack([i, j]) + 0.5) * self.cell)
 
     def random_points(self, rng: Generator, n: int) -> Array:
         """(n, 2) m, uniform over the walkable cells.

@@ -1,20 +1,21 @@
 r"""Does a move cross a wall? Exactly, in constant time.
 
-A move p -> q crosses a wall a-b when p and q lie on different sides of the line ab, and a and b on different sides of
-the line pq, where a point *on* a line counts to its right side:
+A move p -> q crosses a wall a-b when p and q lie on different sides of the line ab, and a and b on different
+sides of the line pq, where a point *on* a line counts to its right side:
 
 .. math:: [o(a,b,p) > 0] \ne [o(a,b,q) > 0] \;\wedge\; [o(p,q,a) > 0] \ne [o(p,q,b) > 0], \quad
           o(a,b,c) = (b-a) \times (c-a)
 
-and when their bounding boxes share a point (which only decides collinear, rounded cases). Both the move and the wall
-are first put in order, lower (x, then y) end first, so the answer does not depend on the direction of either. What
-follows: sliding along a wall does not cross it; a move through the common corner of two walls cannot slip between
-them; someone standing exactly on a wall is on one definite side of it and can leave to that side.
+and when their bounding boxes share a point (which only decides collinear, rounded cases). Both the move and
+the wall are first put in order, lower (x, then y) end first, so the answer does not depend on the direction
+of either. What follows: sliding along a wall does not cross it; a move through the common corner of two
+walls cannot slip between them; someone standing exactly on a wall is on one definite side of it and can
+leave to that side.
 
-`WallIndex` answers without looking at every wall, and with the same answer for every move: (1) a *clearance field* of
-0.25 m cells holds the distance that is free around the cell; a shorter move crosses nothing. (2) A *cell list* of 1 m
-cells holds copies of all walls within the longest move (3 m) of the cell. A move longer than that is tested against
-every wall.
+`WallIndex` answers without looking at every wall, and with the same answer for every move: (1) a *clearance
+field* of 0.25 m cells holds the distance that is free around the cell; a shorter move crosses nothing. (2) A
+*cell list* of 1 m cells holds copies of all walls within the longest move (3 m) of the cell. A move longer
+than that is tested against every wall.
 
 >>> index = WallIndex.build(np.array([[0.0, 1.0, 2.0, 1.0]]))
 >>> index.crosses([1.0, 3.0], [0.0, 0.0], [1.0, 3.0], [2.0, 2.0]).tolist()
@@ -121,7 +122,8 @@ class WallIndex:
             for a in np.broadcast_arrays(*map(np.atleast_1d, (x0, y0, x1, y1)))
         ]
         out = np.empty(len(ends[0]), np.bool_)
-        crosses_many(*ends, *self.arrays, out)
+        ax, ay, bx, by = ends
+        crosses_many(ax, ay, bx, by, *self.arrays, out)
         return out
 
 

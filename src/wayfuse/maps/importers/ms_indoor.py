@@ -1,11 +1,12 @@
 """Import a site of the Indoor Location Competition 2.0 sample ("ms-indoor"): one folder per floor.
 
-``DIR/F1/floor_info.json`` gives the size of the floor's picture in metres, ``DIR/F1/geojson_map.json`` its outline
-(first feature) and its units in WGS84 degrees; waypoints of the recordings are metres of that picture, origin at the
-lower left corner, y up. The picture is exactly the bounding box of the outline, which fixes the frame: x and y are
-linear in longitude and latitude, and the outline's box is (0, 0)-(width, height). The size agrees with the box on a
-sphere of 6378137 m (Web-Mercator metres times cos(latitude)) within a millimetre; that difference is reported as the
-residual of each floor. Against the WGS84 ellipsoid such metres are 0.1 % short in x and 0.4 % long in y.
+``DIR/F1/floor_info.json`` gives the size of the floor's picture in metres, ``DIR/F1/geojson_map.json`` its
+outline (first feature) and its units in WGS84 degrees; waypoints of the recordings are metres of that
+picture, origin at the lower left corner, y up. The picture is exactly the bounding box of the outline, which
+fixes the frame: x and y are linear in longitude and latitude, and the outline's box is (0, 0)-(width,
+height). The size agrees with the box on a sphere of 6378137 m (Web-Mercator metres times cos(latitude))
+within a millimetre; that difference is reported as the residual of each floor. Against the WGS84 ellipsoid
+such metres are 0.1 % short in x and 0.4 % long in y.
 
 What the plan does not hold: doors, stairs, lifts. Every edge of a unit is a wall.
 """
@@ -33,7 +34,7 @@ SPHERE_RADIUS = 6378137.0  # m, of Web-Mercator
 RESIDUAL_LIMIT = 1.0  # m, a larger disagreement of picture and outline is reported
 OUTLINE_MARGIN = 5.0  # m a unit may reach over the outline's box before it is reported
 
-# Categories are opaque ids; these are read off the names of the units that carry them. The most specific one wins.
+# Categories are opaque ids; these are read off the names of the units that carry them. The last wins.
 CATEGORIES = {
     "5d3578421e5fc90682d9fa2c": "closed area",
     "5d357b7f0c02a37d6cc84c8a": "void",
@@ -108,8 +109,8 @@ class _Notes:
 def import_site(folder: Path) -> tuple[Site, ImportReport]:
     """Site of a folder that holds one folder per floor (B1, F1, ...), and what was met on the way.
 
-    A floor without a plan becomes a rectangle without units or anchor; a unit that cannot be drawn is repaired or
-    left out; both are warnings.
+    A floor without a plan becomes a rectangle without units or anchor; a unit that cannot be drawn is
+    repaired or left out; both are warnings.
 
     Raises
     ------
@@ -165,7 +166,8 @@ def _import_floor(folder: Path, level: int) -> tuple[Floor, FloorReport]:
     if not plan.exists():
         notes.add("no geojson_map.json: the outline is the whole picture, without units and WGS84 anchor")
         corners = np.array([[0.0, 0.0], [width, 0.0], [width, height], [0.0, height]])
-        outline, units, frame = clean_polygons([corners])[0], [], None
+        outline, frame = clean_polygons([corners])[0], None
+        units: list[Unit] = []
     else:
         outline, units, frame = _plan(plan, width, height, notes)
     floor = build_floor(
@@ -280,7 +282,7 @@ def _degrees(points: Array) -> Array:
     if points.size == 0 or (np.abs(points[:, 0]).max() <= 180.0 and np.abs(points[:, 1]).max() <= 90.0):
         return points
     lat = np.arctan(np.sinh(points[:, 1] / SPHERE_RADIUS))
-    return np.rad2deg(np.column_stack([points[:, 0] / SPHERE_RADIUS, lat]))
+    return np.asarray(np.rad2deg(np.column_stack([points[:, 0] / SPHERE_RADIUS, lat])))
 
 
 def _read_json(path: Path) -> Any:
