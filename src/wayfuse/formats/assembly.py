@@ -1,4 +1,4 @@
-"""From the columns of a file, in file order, to a `Recording`: clock, ranges, duplicates, scans.
+"""From the columns of a file, in file order, to a `Recording`: ranges, clock, order, repeats, scans.
 
 Every reader yields `Piece` objects, bounded parts of its file with the line number of each record. `assemble` joins
 them and applies the rules that are the same for all formats, each with a counter in the `ReadReport`:
@@ -12,30 +12,18 @@ them and applies the rules that are the same for all formats, each with a counte
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
-from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from wayfuse.core.types import Array, BoolArray, IdArray
+from wayfuse.core.types import BoolArray
+from wayfuse.formats._kernels import mark_repeats
 from wayfuse.formats.clock import mend_clock
+from wayfuse.formats.columns import WIDTHS, Column, LineArray, Piece, count_lines
 from wayfuse.sensors.quality import ReadReport
 from wayfuse.sensors.recording import Device, Recording, Series
 from wayfuse.sensors.records import BleReading, Waypoint, WifiScan
 
-__all__ = ["WIDTHS", "Column", "Piece", "Rows", "assemble"]
-
-WIDTHS: Mapping[str, int] = {
-    "acceleration": 3,
-    "rotation_rate": 3,
-    "magnetic_field": 3,
-    "pressure": 1,
-    "orientation": 4,
-    "wifi": 3,  # rssi (dBm), frequency (MHz, 0 unknown), last seen (s, NaN unknown)
-    "ble": 2,  # rssi (dBm), tx power (dBm, NaN unknown)
-}
+__all__ = ["assemble"]
 
 # What the first columns of a kind can say, (column count, lowest, highest); beyond it the record is dropped.
 _RANGES: Mapping[str, tuple[int, float, float]] = {
@@ -43,70 +31,15 @@ _RANGES: Mapping[str, tuple[int, float, float]] = {
     "rotation_rate": (3, -1e3, 1e3),  # rad/s: phones end at 35
     "magnetic_field": (3, -1e5, 1e5),  # µT: phones end at 5000
     "pressure": (1, 300.0, 1200.0),  # hPa: range of the sensors, 9 km up to a deep mine
-    "orientation": (4, -1.0, 1.0),
+    "orientation": (4, -1.001, 1.001),
     "wifi": (1, -127.0, 20.0),  # dBm
     "ble": (1, -127.0, 20.0),  # dBm
+    "beacon": (1, -127.0, 20.0),  # dBm
 }
-
-LineArray = NDArray[np.int64]
-
-
-class Column(NamedTuple):
-    """Records of one kind in file order: line (n,) 1-based, t (n,) s, values (n, k), ids (n,) or (0,)."""
-
-    line: LineArray
-    t: Array
-    values: Array
-    ids: IdArray
-
-    @classmethod
-    def empty(cls, kind: str) -> Column:
-        """A column of a kind without records."""
-        return cls(np.empty(0, np.int64), np.empty(0), np.empty((0, WIDTHS[kind])), np.empty(0, np.uint64))
-
-    def take(self, index: NDArray[np.int64] | BoolArray) -> Column:
-        """The records at an index or mask."""
-        ids = self.ids[index] if len(self.ids) else self.ids
-        return Column(self.line[index], self.t[index], self.values[index], ids)
-
-
-@dataclass(slots=True)
-class Piece:
-    """A part of a file: columns by kind (`WIDTHS`), waypoints with their lines, and header fields met in it."""
-
-    columns: dict[str, Column] = field(default_factory=dict)
-    waypoints: list[tuple[int, Waypoint]] = field(default_factory=list)
-    header: dict[str, str] = field(default_factory=dict)
-
-
-class Rows:
-    """Builds the columns of a piece record by record (the careful path of the readers)."""
-
-    def __init__(self) -> None:
-        self._rows: dict[str, tuple[list[int], list[float], list[tuple[float, ...]], list[int]]] = {}
-        self.waypoints: list[tuple[int, Waypoint]] = []
-
-    def add(self, kind: str, line: int, t: float, values: tuple[float, ...], identifier: int = 0) -> None:
-        """Append one record."""
-        rows = self._rows.get(kind)
-        if rows is None:
-            rows = self._rows[kind] = ([], [], [], [])
-        rows[0].append(line)
-        rows[1].append(t)
-        rows[2].append(values)
-        rows[3].append(identifier)
-
-    def columns(self) -> dict[str, Column]:
-        """The columns built so far."""
-        out = {}
-        for kind, (line, t, values, ids) in self._rows.items():
-            out[kind] = Column(
-                np.array(line, np.int64),
-                np.array(t, np.float64),
-                np.array(values, np.float64).reshape(len(t), WIDTHS[kind]),
-                np.array(ids, np.uint64),
-            )
-        return out
+_NORM = 1e-3  # a quaternion's squared length may differ so much from 1: seven printed digits, with room
+_HIGHEST_MHZ = 100_000.0  # the 60 GHz band ends below
+_STALE_SPREAD_S = 1.0  # scans are delivered this evenly after their freshest reading
+_SERIES = ("acceleration", "rotation_rate", "magnetic_field", "pressure", "orientation")
 
 
 def assemble(
@@ -119,21 +52,29 @@ def assemble(
     site: str = "",
     floor: str = "",
     one_stream: bool = True,
+    foreign_last_seen: bool = False,
 ) -> Recording:
     """Join the pieces of a file into a recording and count in ``report`` what was dropped or mended.
 
-    ``one_stream`` says that the line numbers order all records of the recording (one file), so that the clock is
-    judged over all of them; otherwise each kind is judged by itself.
+    ``one_stream`` says that the line numbers order all records of the recording (one file), so that a jump of the
+    clock holds for all kinds; otherwise each kind is judged by itself. ``foreign_last_seen`` says that the readings
+    were stamped by another clock, which is then shifted onto the recording's.
     """
     columns, waypoints = _join(pieces)
     columns = {kind: _in_range(kind, column, report) for kind, column in columns.items()}
     columns, waypoints = mend_clock(columns, waypoints, report, one_stream=one_stream)
-    series = {kind: _series(kind, columns, report) for kind in WIDTHS if kind not in {"wifi", "ble"}}
+    wifi = _sorted("wifi", columns.get("wifi"), report)
+    if foreign_last_seen:
+        wifi = _on_own_clock(wifi, report)
     recording = Recording(
         name=name,
-        **series,
-        wifi=_scans(_sorted("wifi", columns.get("wifi"), report), report),
-        ble=_ble(_sorted("ble", columns.get("ble"), report)),
+        acceleration=_series("acceleration", columns, report),
+        rotation_rate=_series("rotation_rate", columns, report),
+        magnetic_field=_series("magnetic_field", columns, report),
+        pressure=_series("pressure", columns, report),
+        orientation=_series("orientation", columns, report),
+        wifi=_scans(_without_repeats(wifi, report)),
+        ble=_ble(columns),
         waypoints=tuple(sorted((w for _, w in waypoints), key=lambda w: w.t)),
         site=site,
         floor=floor,
@@ -143,13 +84,8 @@ def assemble(
         report=report,
     )
     if recording.is_empty:
-        report.add("no records in the recording", max(report.n_lines, 1))
+        report.add("no record in the recording", report.n_lines)
     return recording
-
-
-def stem(path: Path) -> str:
-    """Name of a recording: the file name without its last suffix."""
-    return path.stem if path.is_file() else path.name
 
 
 def _join(pieces: Iterable[Piece]) -> tuple[dict[str, Column], list[tuple[int, Waypoint]]]:
@@ -170,27 +106,43 @@ def _join(pieces: Iterable[Piece]) -> tuple[dict[str, Column], list[tuple[int, W
 
 
 def _in_range(kind: str, column: Column, report: ReadReport) -> Column:
-    """Drop records whose values are not finite or outside the sensor's range."""
+    """Drop records whose values are not finite or outside the sensor's range; unknown frequencies become 0."""
     k, low, high = _RANGES[kind]
-    values = column.values[:, :k]
-    if not len(values) or (values.min() >= low and values.max() <= high):  # NaN fails both
-        return column
-    finite = np.isfinite(values).all(axis=1)
-    inside = finite & ((values >= low) & (values <= high)).all(axis=1)
     label = kind.replace("_", " ")
-    _count(report, f"{label}: not finite", column.line[~finite])
-    _count(report, f"{label}: out of range", column.line[finite & ~inside])
-    return column.take(inside)
+    values = column.values[:, :k]
+    inside: BoolArray | None = None
+    if len(values) and not (values.min() >= low and values.max() <= high):  # NaN fails both
+        finite = np.isfinite(values).all(axis=1)
+        inside = finite & ((values >= low) & (values <= high)).all(axis=1)
+        count_lines(report, f"{label}: not finite", column.line[~finite])
+        count_lines(report, f"{label}: out of range", column.line[finite & ~inside])
+        column = column.take(inside)
+    if kind == "orientation":
+        unit = np.abs(np.einsum("ij,ij->i", column.values, column.values) - 1.0) <= _NORM
+        if not unit.all():
+            count_lines(report, f"{label}: no unit quaternion", column.line[~unit])
+            column = column.take(unit)
+    elif kind == "wifi":
+        mhz = column.values[:, 1]
+        if len(mhz) and not (mhz.min() >= 0.0 and mhz.max() <= _HIGHEST_MHZ):
+            strange = ~((mhz >= 0.0) & (mhz <= _HIGHEST_MHZ))
+            count_lines(report, "wifi: frequency out of range, taken as unknown", column.line[strange])
+            values = column.values.copy()
+            values[strange, 1] = 0.0
+            column = column._replace(values=values)
+    return column
 
 
-def _sorted(kind: str, column: Column | None, report: ReadReport) -> Column:
+def _sorted(kind: str, column: Column | None, report: ReadReport | None) -> Column:
+    """A column in time order; records that came late are counted."""
     if column is None:
         return Column.empty(kind)
     t = column.t
     if len(t) < 2 or bool((t[1:] >= t[:-1]).all()):
         return column
-    late = t < np.maximum.accumulate(t)
-    _count(report, f"{kind.replace('_', ' ')}: out of time order, sorted", column.line[late])
+    if report is not None:
+        late = t < np.maximum.accumulate(t)
+        count_lines(report, f"{kind.replace('_', ' ')}: out of time order, sorted", column.line[late])
     return column.take(np.argsort(t, kind="stable"))
 
 
@@ -199,54 +151,72 @@ def _series(kind: str, columns: Mapping[str, Column], report: ReadReport) -> Ser
     return Series(column.t, column.values)
 
 
-def _scans(column: Column, report: ReadReport) -> tuple[WifiScan, ...]:
-    """One scan per delivery time, exact repeats dropped."""
-    column = _without_repeats(column, report)
+def _without_repeats(column: Column, report: ReadReport) -> Column:
+    n = len(column.t)
+    if n < 2:
+        return column
+    table = np.full(1 << (2 * n - 1).bit_length(), -1, np.int64)
+    repeat = np.empty(n, np.bool_)
+    mark_repeats(column.t, column.ids, column.values, table, repeat)
+    if not repeat.any():
+        return column
+    count_lines(report, "wifi: exact repeat of a reading", column.line[repeat])
+    return column.take(~repeat)
+
+
+def _scans(column: Column) -> tuple[WifiScan, ...]:
+    """One scan per delivery time; ``column`` in time order."""
     n = len(column.t)
     if not n:
         return ()
     rssi = column.values[:, 0].astype(np.float32)
     frequency = column.values[:, 1].astype(np.int32)
     last_seen = np.ascontiguousarray(column.values[:, 2])
-    edges = np.flatnonzero(column.t[1:] != column.t[:-1]) + 1
-    starts, stops = [0, *edges.tolist()], [*edges.tolist(), n]
+    edges = (np.flatnonzero(column.t[1:] != column.t[:-1]) + 1).tolist()
     times, ids = column.t, column.ids
     return tuple(
         WifiScan(float(times[i]), ids[i:j], rssi[i:j], frequency[i:j], last_seen[i:j])
-        for i, j in zip(starts, stops, strict=True)
+        for i, j in zip([0, *edges], [*edges, n], strict=True)
     )
 
 
-def _without_repeats(column: Column, report: ReadReport) -> Column:
-    seen: set[tuple[object, ...]] = set()
-    keep = np.ones(len(column.t), bool)
-    rows = zip(column.t.tolist(), column.ids.tolist(), map(tuple, column.values.tolist()), strict=True)
-    for i, row in enumerate(rows):
-        key = repr(row)
-        if key in seen:
-            keep[i] = False
-        seen.add(key)
-    if keep.all():
+def _on_own_clock(column: Column, report: ReadReport) -> Column:
+    """Shift ``last_seen`` from the clock of the radio onto that of the recording.
+
+    One shift serves the whole file, so that repeats of a reading keep one time: the freshest reading of the promptest
+    scan was seen when that scan was delivered. Where the two clocks always agree the time was not recorded.
+    """
+    if not len(column.t):
         return column
-    _count(report, "wifi: exact repeat of a reading", column.line[~keep])
-    return column.take(keep)
+    values = column.values.copy()
+    seen = values[:, 2]
+    starts = np.concatenate([[0], np.flatnonzero(np.diff(column.t)) + 1])
+    delay = column.t[starts] - np.fmax.reduceat(seen, starts)
+    delay = delay[np.isfinite(delay)]
+    if not len(delay) or bool((column.t == seen).all()):
+        seen[:] = np.nan
+        return column._replace(values=values)
+    prompt = delay[delay >= np.median(delay) - _STALE_SPREAD_S].min()
+    values[:, 2] = seen + prompt
+    late = values[:, 2] > column.t + 1e-6
+    if late.any():
+        count_lines(report, "wifi: last seen after delivery, taken as unknown", column.line[late])
+        values[late, 2] = np.nan
+    values[:, 2] = np.fmin(values[:, 2], column.t, where=~np.isnan(values[:, 2]), out=values[:, 2])
+    return column._replace(values=values)
 
 
-def _ble(column: Column) -> tuple[BleReading, ...]:
-    return tuple(
-        map(
-            BleReading,
-            column.t.tolist(),
-            column.ids.tolist(),
-            column.values[:, 0].tolist(),
-            column.values[:, 1].tolist(),
-        )
-    )
-
-
-def _count(report: ReadReport, kind: str, lines: LineArray) -> None:
-    """Count a fault at each of the lines."""
-    for line in lines[:5].tolist():
-        report.add(kind, line)
-    if len(lines) > 5:
-        report.issues[kind].count += len(lines) - 5
+def _ble(columns: Mapping[str, Column]) -> tuple[BleReading, ...]:
+    """Advertisements in time order; beacons also heard in ``ble`` only add their tx power there."""
+    ble = columns.get("ble", Column.empty("ble"))
+    beacon = columns.get("beacon")
+    if beacon is not None and len(ble.t):
+        power = dict(zip(beacon.ids.tolist(), beacon.values[:, 1].tolist(), strict=True))
+        known = np.array([power.get(i, np.nan) for i in ble.ids.tolist()])
+        ble = ble._replace(values=np.column_stack([ble.values[:, 0], known]))
+        beacon = beacon.take(~np.isin(beacon.ids, ble.ids))
+    if beacon is not None and len(beacon.t):
+        ble = Column(*(np.concatenate(pair) for pair in zip(ble, beacon, strict=True)))
+    column = _sorted("ble", ble, None)  # two paths deliver advertisements: their order is no fault
+    rssi, power_dbm = column.values[:, 0].tolist(), column.values[:, 1].tolist()
+    return tuple(map(BleReading, column.t.tolist(), column.ids.tolist(), rssi, power_dbm))

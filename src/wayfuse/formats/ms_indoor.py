@@ -1,17 +1,32 @@
 """Reader of the ms-indoor text logs (Indoor Location Competition 2.0, both public editions).
 
 One record per line: Unix time in ms, a tab, ``TYPE_...``, tab-separated fields; ``#`` lines are the header. Two
-records may share a line where a line end is missing; an SSID may hold anything, tabs too.
+records may share a line where a line end is missing; an SSID may hold anything, tabs too. The larger edition has
+digests in place of BSSIDs. A compiled scanner reads the lines that are as they should be, `_Careful` all others;
+together they equal the plain loop exactly.
+
+``TYPE_BLUE`` is every Bluetooth advertisement; ``TYPE_BEACON`` and ``TYPE_BLU4`` repeat those that are iBeacons. A
+beacon heard as ``BLUE`` is therefore read once, with the tx power that ``BEACON`` adds.
+
+References
+----------
+.. [1] Indoor Location Competition 2.0 data set, github.com/location-competition/indoor-location-competition-20.
 """
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterator
 from pathlib import Path
 
+import numpy as np
+
 from wayfuse.core.errors import FormatError
-from wayfuse.formats.assembly import Piece, Rows, assemble
+from wayfuse.core.types import Array
+from wayfuse.formats._kernels import KINDS, scan_ms_indoor
+from wayfuse.formats.assembly import assemble
+from wayfuse.formats.columns import Column, Piece, Rows, is_number, quaternions
 from wayfuse.sensors.quality import ReadReport
 from wayfuse.sensors.recording import Device, Recording
 from wayfuse.sensors.records import Waypoint, bssid_id
@@ -19,13 +34,15 @@ from wayfuse.sensors.records import Waypoint, bssid_id
 __all__ = ["blocks", "read"]
 
 BLOCK_BYTES = 4 << 20
-_SENSORS = {
-    b"TYPE_ACCELEROMETER": "acceleration",
-    b"TYPE_GYROSCOPE": "rotation_rate",
-    b"TYPE_MAGNETIC_FIELD": "magnetic_field",
-}
-_RECORD = re.compile(rb"\d{13}\tTYPE_")
-_NAMES = {"SiteName", "FloorName", "Brand", "Model", "AndroidName", "startTime", "endTime", "SiteID", "FloorId"}
+_PADDING = bytes(64)  # zeros behind a block: the scanner looks ahead without asking where the block ends
+
+# What the columns of the scanner's kinds become; ``beacon`` is joined with ``ble`` once the file is whole.
+_COLUMNS = ("acceleration", "rotation_rate", "magnetic_field", "orientation", "wifi", "ble", "beacon")
+_FIELDS = {"WIFI": 7, "BLUE": 5, "BEACON": 9, "WAYPOINT": 4} | dict.fromkeys(KINDS[:4], 6)
+_IGNORED = {*KINDS[7:], "DIST1", "DIST2", "PRESSURE", "LIGHT", "PROXIMITY"}
+_HEADER = {"startTime", "endTime", "SiteID", "SiteName", "FloorId", "FloorName", "Brand", "Model", "AndroidName"}
+_RECORD = re.compile(rb"\d{13}\tTYPE_[A-Z]")
+_WHOLE = re.compile(rb"\d+")
 
 
 def read(path: str | Path) -> Recording:
@@ -42,13 +59,15 @@ def read(path: str | Path) -> Recording:
     for piece in pieces:
         header |= piece.header
     if not header and not report.n_records:
-        raise FormatError("not an ms-indoor log", where=path)
+        what = "the file is empty" if path.stat().st_size == 0 else "neither a header nor a record of ms-indoor"
+        raise FormatError(what, where=path, remedy="give --format, or leave the file out")
+    system = f"Android {header['AndroidName']}" if header.get("AndroidName") else ""
     return assemble(
         pieces,
         report,
         name=path.stem,
         clock="Unix time",
-        device=Device(header.get("Brand", ""), header.get("Model", ""), f"Android {header.get('AndroidName', '')}"),
+        device=Device(header.get("Brand", ""), header.get("Model", ""), system),
         site=header.get("SiteName", ""),
         floor=header.get("FloorName", ""),
     )
@@ -57,8 +76,9 @@ def read(path: str | Path) -> Recording:
 def blocks(
     path: str | Path, block_bytes: int = BLOCK_BYTES, *, report: ReadReport | None = None
 ) -> Iterator[Piece]:
-    """Pieces of a log in file order, reading ``block_bytes`` at a time."""
+    """Pieces of a log in file order, reading ``block_bytes`` at a time; ``report`` is filled on the way."""
     report = ReadReport(path=str(path)) if report is None else report
+    floor = ""
     with Path(path).open("rb") as file:
         tail = b""
         while data := file.read(block_bytes):
@@ -66,54 +86,156 @@ def blocks(
             cut = data.rfind(b"\n") + 1
             tail = data[cut:]
             if cut:
-                yield _piece(data[:cut], report)
+                piece = _piece(data[:cut], report, floor)
+                floor = piece.header.get("FloorName", floor)
+                yield piece
         if tail:
-            yield _piece(tail, report)
+            yield _last_line(tail, report, floor)
 
 
-def _piece(data: bytes, report: ReadReport) -> Piece:
-    rows, header = Rows(), {}
-    for line in data.splitlines():
-        report.n_lines += 1
+def _piece(data: bytes, report: ReadReport, floor: str) -> Piece:
+    """Records of whole lines: the scanner's, and those it left to the careful path."""
+    buf = np.frombuffer(data + _PADDING, np.uint8)
+    m = data.count(b"\n") + 1
+    line, t, ids = np.empty((7, m), np.int64), np.empty((7, m)), np.empty((7, m), np.uint64)
+    values = np.empty((7, m, 3))
+    token, care = np.empty((m, 4), np.int64), np.empty((m, 3), np.int64)
+    counts = np.zeros(13, np.int64)
+    n_lines = scan_ms_indoor(buf, line, t, values, ids, token, care, counts)
+    known: dict[bytes, int] = {}
+    for kind, row, start, stop in token[: counts[11]].tolist():
+        text = data[start:stop]
+        if text not in known:
+            known[text] = bssid_id(text.decode("utf-8", "replace"))
+        ids[kind, row] = known[text]
+    careful = _Careful(report, floor)
+    for number, start, stop in care[: counts[12]].tolist():
+        careful.line(data[start:stop], report.n_lines + number)
+    columns = {}
+    for row, (kind, n) in enumerate(zip(_COLUMNS, counts[:7].tolist(), strict=True)):
+        if n:
+            columns[kind] = Column(
+                line[row, :n] + report.n_lines,
+                t[row, :n].copy(),
+                _shaped(kind, values[row, :n]),
+                ids[row, :n].copy() if row > 3 else ids[row, :0],
+            )
+    for name, n in zip(KINDS, counts[:11].tolist(), strict=True):
+        if n:
+            report.n_records[name] = report.n_records.get(name, 0) + n
+    report.n_lines += n_lines
+    return Piece(_merged(columns, careful.rows.columns()), careful.rows.waypoints, careful.header)
+
+
+def _last_line(data: bytes, report: ReadReport, floor: str) -> Piece:
+    """The last line, which has no line end: kept where it is whole, and counted."""
+    report.n_lines += 1
+    careful = _Careful(report, floor, truncated=True)
+    careful.line(data, report.n_lines)
+    return Piece(careful.rows.columns(), careful.rows.waypoints, careful.header)
+
+
+def _shaped(kind: str, values: Array) -> Array:
+    if kind == "orientation":
+        return quaternions(values)
+    return values[:, :2].copy() if kind in {"ble", "beacon"} else values.copy()
+
+
+def _merged(columns: dict[str, Column], careful: dict[str, Column]) -> dict[str, Column]:
+    """Columns of both paths in line order (stable: records of one line keep their order)."""
+    for kind, more in careful.items():
+        column = columns.get(kind)
+        if column is None:
+            columns[kind] = more
+            continue
+        joined = [np.concatenate(pair) for pair in zip(column, more, strict=True)]
+        order = np.argsort(joined[0], kind="stable")
+        columns[kind] = Column(*joined).take(order)
+    return columns
+
+
+class _Careful:
+    """Reads single lines as they come: header, joined records, SSIDs with tabs, faults."""
+
+    def __init__(self, report: ReadReport, floor: str, *, truncated: bool = False) -> None:
+        self.rows, self.header = Rows(), {"FloorName": floor} if floor else {}
+        self._report, self._truncated = report, truncated
+
+    def line(self, line: bytes, number: int) -> None:
+        """Read one line without its line end."""
+        line = line.removesuffix(b"\r")
         if line.startswith(b"#"):
-            for entry in line.decode("utf-8", "replace").split("\t"):
-                key, _, value = entry.partition(":")
-                if key in _NAMES:
-                    header[key] = value
-        elif line:
-            for record in _records(line):
-                _parse(record, report.n_lines, rows, report)
-    return Piece(rows.columns(), rows.waypoints, header)
+            self._read_header(line)
+            return
+        if not line.strip():
+            return
+        starts = [m.start() for m in _RECORD.finditer(line)]
+        if len(starts) > 1:
+            self._report.add("two records on a line, both read", number)
+        if starts and starts[0] > 0:
+            self._report.add("unreadable text before a record", number)
+        if not starts:
+            self._fault("not a record" if line.isascii() else "not a record (no text)", number)
+        for k, (start, stop) in enumerate(zip(starts, [*starts[1:], len(line)], strict=True)):
+            self._record(line[start:stop].split(b"\t"), number, last=k == len(starts) - 1)
 
+    def _read_header(self, line: bytes) -> None:
+        for entry in line.decode("utf-8", "replace").split("\t"):
+            key, _, value = entry.partition(":")
+            if key in _HEADER:
+                self.header[key] = value.strip()
 
-def _records(line: bytes) -> list[bytes]:
-    starts = [m.start() for m in _RECORD.finditer(line)]
-    if len(starts) < 2:
-        return [line]
-    return [line[i:j] for i, j in zip(starts, [*starts[1:], len(line)], strict=True)]
+    def _fault(self, what: str, number: int) -> None:
+        self._report.add("truncated last line" if self._truncated else what, number)
 
+    def _record(self, f: list[bytes], number: int, *, last: bool) -> None:
+        kind = f[1][5:].decode("ascii", "replace")
+        if kind not in _FIELDS:
+            if kind not in _IGNORED and not kind.endswith("_ACCURACY_CHANGED"):
+                self._fault(f"unknown kind TYPE_{kind[:40]}", number)
+                return
+        elif len(f) < _FIELDS[kind]:
+            self._fault(f"{kind}: {len(f)} fields of {_FIELDS[kind]}", number)
+            return
+        elif not self._take(kind, int(f[0]) / 1000, f, number):
+            self._fault(f"{kind}: not a number where one is due", number)
+            return
+        if self._truncated and last:
+            self._report.add("last line has no line end, kept", number)
+        self._report.n_records[kind] = self._report.n_records.get(kind, 0) + 1
 
-def _parse(line: bytes, number: int, rows: Rows, report: ReadReport) -> None:
-    f = line.split(b"\t")
-    kind = f[1] if len(f) > 1 else b""
-    try:
-        t = int(f[0]) / 1000
-        if kind in _SENSORS:
-            rows.add(_SENSORS[kind], number, t, (float(f[2]), float(f[3]), float(f[4])))
-        elif kind == b"TYPE_ROTATION_VECTOR":
+    def _take(self, kind: str, t: float, f: list[bytes], number: int) -> bool:
+        """Add a record whose fields are enough; False where one of them is no number."""
+        if kind in KINDS[:4]:
+            if len(f) != 6 or not all(map(is_number, f[2:])):
+                return False
             x, y, z = float(f[2]), float(f[3]), float(f[4])
-            rows.add("orientation", number, t, (max(0.0, 1 - x * x - y * y - z * z) ** 0.5, x, y, z))
-        elif kind == b"TYPE_WIFI":
+            values: tuple[float, ...] = (x, y, z)
+            if kind == "ROTATION_VECTOR":
+                values = (math.sqrt(max(0.0, 1.0 - x * x - y * y - z * z)), x, y, z)
+            self.rows.add(_COLUMNS[KINDS.index(kind)], number, t, values)
+        elif kind == "WIFI":
+            if not (is_number(f[-3]) and is_number(f[-2]) and _WHOLE.fullmatch(f[-1]) and f[-4]):
+                return False
+            if len(f[-1]) != len(f[0]):  # cut short or grown together with something else
+                return False
             values = (float(f[-3]), float(f[-2]), int(f[-1]) / 1000)
-            rows.add("wifi", number, t, values, bssid_id(f[-4].decode()))
-        elif kind == b"TYPE_BEACON":
-            rows.add("ble", number, t, (float(f[6]), float(f[5])), bssid_id(f[8].decode()))
-        elif kind == b"TYPE_BLUE":
-            rows.add("ble", number, t, (float(f[-1]), float("nan")), bssid_id(f[-2].decode()))
-        elif kind == b"TYPE_WAYPOINT":
-            rows.waypoints.append((number, Waypoint(t, float(f[2]), float(f[3]), "")))
-    except (ValueError, IndexError):
-        report.add(f"{kind.decode('ascii', 'replace') or 'line'}: not a whole record", number)
-        return
-    name = kind.decode("ascii", "replace")
-    report.n_records[name] = report.n_records.get(name, 0) + 1
+            self.rows.add("wifi", number, t, values, _identifier(f[-4]))
+        elif kind == "BLUE":
+            if not (is_number(f[-1]) and f[-2]):
+                return False
+            self.rows.add("ble", number, t, (float(f[-1]), math.nan), _identifier(f[-2]))
+        elif kind == "BEACON":
+            if not (len(f) in {9, 10} and is_number(f[5]) and is_number(f[6]) and f[8]):
+                return False
+            self.rows.add("beacon", number, t, (float(f[6]), float(f[5])), _identifier(f[8]))
+        else:
+            if len(f) != 4 or not (is_number(f[2]) and is_number(f[3])):
+                return False
+            floor = self.header.get("FloorName", "")
+            self.rows.waypoints.append((number, Waypoint(t, float(f[2]), float(f[3]), floor)))
+        return True
+
+
+def _identifier(text: bytes) -> int:
+    return bssid_id(text.decode("utf-8", "replace"))
