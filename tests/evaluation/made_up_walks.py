@@ -13,7 +13,8 @@ from wayfuse.sensors.records import Waypoint, WifiScan
 
 
 def scan(t: float) -> WifiScan:
-    return WifiScan(t, np.array([1], np.uint64), np.array([-50], np.float32), np.array([2412], np.int32), np.array([t]))
+    bssid, rssi, frequency = np.array([1], np.uint64), np.array([-50], np.float32), np.array([2412], np.int32)
+    return WifiScan(t, bssid, rssi, frequency, np.array([t]))
 
 
 def recording(
