@@ -1,0 +1,98 @@
+"""A phone's Wi-Fi scanner: sweeps over the channels, misses, and lists that repeat what was heard before.
+
+Android delivers a list of everything it still remembers, each network with the time it was last heard. About
+half of such a list is stale, and a weak network is heard in few sweeps but listed in most. Sweeps go on
+before the recording starts, so the first list already has a past.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from wayfuse.core.types import Array, IntArray
+from wayfuse.simulator.radio_field import RadioField
+from wayfuse.simulator.walker import Walk
+
+__all__ = ["ScannerModel", "Sweep", "scan"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ScannerModel:
+    """The scanner. "measured" marks figures of the public ms-indoor recordings."""
+
+    period_s: float = (
+        2.1  # s between lists; measured 1.9 to 3.7. Throttled Android: 30 (4 scans in 2 minutes)
+    )
+    period_jitter_s: float = 0.1
+    sweep_s: float = 1.4  # s from the first channel to the last
+    latency_s: float = 0.6  # s from the last channel to the list; measured age of the freshest tenth 0.73 s
+    memory_s: float = 30.0  # s a network stays listed; measured 99 % younger than 29 s
+    before_s: float = 30.0  # s of sweeps before the recording, at its first place
+    sensitivity_dbm: float = -89.0  # measured weakest readings -93 to -90 dBm
+    softness_db: float = 1.5  # logistic edge of the sensitivity
+    hit_rate: float = 0.8  # chance that a strong network is heard in a sweep
+    fading_db: float = 2.5  # per sweep and radio: people, doors, the hand
+    twin_db: float = 0.7  # per reading: networks of one radio
+    body_db: float = 4.0  # behind the walker's back
+    device_offset_db: float = 0.0  # of this phone's receiver
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Sweep:
+    """One delivered list: time t (s from the walk's start), networks (n,), dBm (n,), last heard (n,) s."""
+
+    t: float
+    network: IntArray
+    rssi: Array
+    last_seen: Array
+
+
+def scan(
+    walk: Walk, floor: int, radios: RadioField, model: ScannerModel, rng: np.random.Generator
+) -> tuple[Sweep, ...]:
+    """The lists a phone delivers on a walk."""
+    delivered = _delivery_times(walk.duration, model, rng)
+    n_radios, n_sweeps = radios.n_radios, len(delivered)
+    order = np.argsort(np.argsort(radios.frequency, kind="stable")) / max(1, n_radios - 1)
+    heard_at = delivered[:, None] - model.latency_s - model.sweep_s * (1.0 - order)  # (sweeps, radios)
+    level = _levels(walk, floor, radios, heard_at, model)
+    level += rng.normal(0.0, model.fading_db, (n_sweeps, n_radios)) + model.device_offset_db
+
+    n = len(radios.bssid)
+    rssi = np.round(level[:, radios.radio] + rng.normal(0.0, model.twin_db, (n_sweeps, n)))
+    edge = (rssi - model.sensitivity_dbm) / model.softness_db
+    heard = rng.random((n_sweeps, n)) < model.hit_rate / (1.0 + np.exp(-edge))
+    times = heard_at[:, radios.radio]
+
+    last_seen, last_rssi = np.full(n, -np.inf), np.zeros(n)
+    sweeps = []
+    for k, t in enumerate(delivered.tolist()):
+        last_seen = np.where(heard[k], times[k], last_seen)
+        last_rssi = np.where(heard[k], rssi[k], last_rssi)
+        listed = np.flatnonzero(t - last_seen <= model.memory_s)
+        if 0.0 <= t <= walk.duration and len(listed):
+            listed = listed[np.argsort(-last_rssi[listed], kind="stable")]
+            sweeps.append(Sweep(t, listed, last_rssi[listed], last_seen[listed]))
+    return tuple(sweeps)
+
+
+def _delivery_times(duration: float, model: ScannerModel, rng: np.random.Generator) -> Array:
+    n = int(np.ceil((duration + model.before_s) / (0.5 * model.period_s))) + 2
+    gaps = np.maximum(rng.normal(model.period_s, model.period_jitter_s, n), 0.5 * model.period_s)
+    t = -model.before_s + rng.uniform(0.0, model.period_s) + np.cumsum(gaps)
+    return np.asarray(t[t <= duration])
+
+
+def _levels(walk: Walk, floor: int, radios: RadioField, heard_at: Array, model: ScannerModel) -> Array:
+    """RSSI (sweeps, radios) dBm at the places and headings of the moments each radio is heard."""
+    shape = heard_at.shape
+    flat = heard_at.ravel()
+    xy = np.column_stack([np.interp(flat, walk.t, walk.xy[:, k]) for k in (0, 1)])
+    heading = np.interp(flat, walk.t, walk.heading)
+    radio = np.tile(np.arange(shape[1]), shape[0])
+    level = radios.rssi(radio, xy, floor)
+    away = radios.ap_xy[radios.ap[radio]] - xy
+    ahead = np.cos(np.arctan2(away[:, 1], away[:, 0]) - heading)
+    return np.asarray((level - 0.5 * model.body_db * (1.0 - ahead)).reshape(shape))
