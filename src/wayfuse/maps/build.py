@@ -9,16 +9,16 @@ import numpy as np
 from wayfuse.core.errors import MapError
 from wayfuse.core.frames import GeoAnchor
 from wayfuse.core.types import Array
-from wayfuse.maps.geometry import free_space, normalise_walls, rasterise, ring_walls
+from wayfuse.maps.geometry import edges, free_space, normalise_walls, rasterise, ring_walls
 from wayfuse.maps.site import STOREY_HEIGHT, Floor, Polygon, Unit
 from wayfuse.maps.walls import WallIndex
 
 __all__ = ["build_floor", "nominal_elevation"]
 
 
-def nominal_elevation(level: int) -> float:
-    """Elevation (m) of a level where the plan gives none; F1 is 0, and there is no level 0 below it but G."""
-    return STOREY_HEIGHT * (level - 1 if level > 0 else level)
+def nominal_elevation(level: int, *, has_ground: bool = False) -> float:
+    """Elevation (m) of a level where the plan gives none: 0 for F1, or for level 0 where there is one."""
+    return STOREY_HEIGHT * (level - 1 if level > 0 and not has_ground else level)
 
 
 def build_floor(
@@ -51,6 +51,8 @@ def build_floor(
     corner = np.max([p.exterior.max(axis=0) for p in outline], axis=0)
     shapes = [unit.polygon for unit in units]
     segments = ring_walls([*outline, *shapes]) if walls is None else normalise_walls(walls)
+    free = free_space(outline, shapes)
+    barriers = edges(free)
     return Floor(
         name=name,
         level=level,
@@ -60,7 +62,9 @@ def build_floor(
         outline=tuple(outline),
         units=tuple(units),
         walls=segments,
-        walkable=rasterise(free_space(outline, shapes)),
+        barriers=barriers,
+        walkable=rasterise(free),
         wall_index=WallIndex.build(segments),
+        barrier_index=WallIndex.build(barriers),
         anchor=anchor,
     )

@@ -14,9 +14,19 @@ from wayfuse.core.types import Array
 from wayfuse.maps.site import Polygon
 from wayfuse.maps.walkable import CELL, WIDENING, Walkable
 
-__all__ = ["RESOLUTION", "clean_polygons", "free_space", "normalise_walls", "rasterise", "ring_walls"]
+__all__ = [
+    "RESOLUTION",
+    "clean_polygons",
+    "edges",
+    "free_space",
+    "from_shapely",
+    "normalise_walls",
+    "rasterise",
+    "ring_walls",
+]
 
 RESOLUTION = 1e-3  # m, coordinates are rounded to this: finer than any plan, and readable in a file
+SMOOTHNESS = 0.05  # m, rounded corners of the walkable space are drawn to this
 NARROWEST = 0.2  # m, a gap between two units narrower than this is a drawing error, not a passage
 
 
@@ -34,7 +44,7 @@ def clean_polygons(rings: Sequence[Array]) -> tuple[tuple[Polygon, ...], str]:
     """
     import shapely
 
-    rings = [np.round(ring / RESOLUTION) * RESOLUTION for ring in rings]
+    rings = [_rounded(ring) for ring in rings]
     if not rings or any(len(ring) < 3 or not np.all(np.isfinite(ring)) for ring in rings):
         return (), "fewer than three points, or coordinates that are not numbers"
     drawn = shapely.Polygon(rings[0], [*rings[1:]])
@@ -87,6 +97,16 @@ def rasterise(shape: Any, cell: float = CELL) -> Walkable:
     x, y = np.meshgrid((i0 + np.arange(nx) + 0.5) * cell, (j0 + np.arange(ny) + 0.5) * cell)
     mask = np.asarray(shapely.contains_xy(shape, x, y), dtype=np.uint8)
     return Walkable((i0 * cell, j0 * cell), cell, mask)
+
+
+def edges(shape: Any) -> Array:
+    """Edges (w, 4) m of a shapely geometry, drawn with as few as `SMOOTHNESS` allows."""
+    parts = from_shapely(shape.simplify(SMOOTHNESS))
+    return ring_walls([Polygon(*(_rounded(p.exterior), tuple(_rounded(h) for h in p.holes))) for p in parts])
+
+
+def _rounded(ring: Array) -> Array:
+    return np.asarray(np.round(ring / RESOLUTION) * RESOLUTION)
 
 
 def ring_walls(polygons: Iterable[Polygon]) -> Array:

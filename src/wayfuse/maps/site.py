@@ -61,7 +61,10 @@ class Floor:
     height : m, the extent of the frame. elevation : m above F1 (nominal where the plan does not say).
     outline : outer polygons with their holes. units : closed areas. walls : (w, 4) segments x0, y0, x1, y1
     in m.
-    walkable, wall_index : derived tables. anchor : to WGS84, None where the plan has none.
+    barriers : (b, 4) m, edges of the walkable space: walls set back by its widening, for neither plans nor
+    people are exact (of 3064 straight legs between surveyed waypoints in a mall, 5.3 % cross a wall and 2.0 %
+    a barrier).
+    walkable, wall_index, barrier_index : derived tables. anchor : to WGS84, None where the plan has none.
     """
 
     name: str
@@ -72,8 +75,10 @@ class Floor:
     outline: tuple[Polygon, ...]
     units: tuple[Unit, ...]
     walls: Array
+    barriers: Array
     walkable: Walkable
     wall_index: WallIndex
+    barrier_index: WallIndex
     anchor: GeoAnchor | None = None
 
     @property

@@ -2,7 +2,7 @@
 
 ```
 site.json      name, floors bottom up (level, size, elevation, anchor), provenance, sha256 of every file
-F1.geojson     outline, units and walls of floor F1 in metres of its frame
+F1.geojson     outline, units, walls and barriers of floor F1 in metres of its frame
 F1.npz         walkable mask and wall tables, derived from F1.geojson when the site was built
 ```
 A reader needs no geometry library. A file that is missing, damaged, edited or newer than this version is an
@@ -28,10 +28,11 @@ from wayfuse.maps.site import Floor, Polygon, Site, Unit
 from wayfuse.maps.walkable import Walkable
 from wayfuse.maps.walls import WallIndex
 
-__all__ = ["FORMAT", "VERSION", "load_site", "save_site"]
+__all__ = ["FORMAT", "VERSION", "check_target", "file_stems", "load_site", "save_site"]
 
 FORMAT = "wayfuse-site"
 VERSION = 1
+WALL_TABLES = ("clearance", "start", "index")  # of an index, as `WallIndex.tables` gives them
 MANIFEST = "site.json"
 ANEW = "import the site anew with `wayfuse site import`"
 
@@ -44,9 +45,19 @@ def save_site(site: Site, folder: Path, *, overwrite: bool = False) -> None:
     MapError : the folder holds something already, and ``overwrite`` is not set or it is not a site.
     """
     folder = Path(folder)
-    _make_room(folder, overwrite)
-    entries = []
-    for floor, stem in zip(site.floors, _stems(site.floor_names), strict=True):
+    check_target(folder, overwrite)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        _write(site, folder)
+    except OSError as error:
+        raise MapError(
+            f"cannot write: {error.strerror}", where=folder, remedy="name another folder"
+        ) from error
+
+
+def _write(site: Site, folder: Path) -> None:
+    entries: list[dict[str, Any]] = []
+    for floor, stem in zip(site.floors, file_stems(site.floor_names), strict=True):
         drawn, derived = _geojson(floor), _tables(floor)
         (folder / f"{stem}.geojson").write_bytes(drawn)
         (folder / f"{stem}.npz").write_bytes(derived)
@@ -71,6 +82,10 @@ def save_site(site: Site, folder: Path, *, overwrite: bool = False) -> None:
     }
     text = json.dumps(manifest, indent=1, ensure_ascii=False)
     (folder / MANIFEST).write_text(text + "\n", encoding="utf-8")
+    current = {name for entry in entries for name in entry["files"]}
+    for path in [*folder.glob("*.geojson"), *folder.glob("*.npz")]:
+        if path.name not in current:
+            path.unlink()
 
 
 def load_site(folder: Path) -> Site:
@@ -89,7 +104,8 @@ def load_site(folder: Path) -> Site:
         raise MapError(f"damaged: {error!r}", where=folder / MANIFEST, remedy=ANEW) from error
 
 
-def _make_room(folder: Path, overwrite: bool) -> None:
+def check_target(folder: Path, overwrite: bool) -> None:
+    """Raise MapError where `save_site` would: the folder is a file, or holds other things or a site."""
     if folder.exists() and not folder.is_dir():
         raise MapError("is a file, not a folder", where=folder, remedy="name another folder")
     held = sorted(p.name for p in folder.iterdir()) if folder.is_dir() else []
@@ -101,11 +117,6 @@ def _make_room(folder: Path, overwrite: bool) -> None:
         raise MapError(
             "holds a site already", where=folder, remedy="name another folder, or give --overwrite"
         )
-    folder.mkdir(parents=True, exist_ok=True)
-    (folder / MANIFEST).unlink(missing_ok=True)
-    for name in held:
-        if name.endswith((".geojson", ".npz")):
-            (folder / name).unlink()
 
 
 def _manifest(folder: Path) -> dict[str, Any]:
@@ -126,8 +137,8 @@ def _manifest(folder: Path) -> dict[str, Any]:
     return manifest
 
 
-def _stems(names: tuple[str, ...]) -> list[str]:
-    """A file stem per floor: its name where that can be one, unique whatever the case."""
+def file_stems(names: tuple[str, ...]) -> list[str]:
+    """A file stem for each floor name: the name where it can be one, unique whatever the case."""
     stems: list[str] = []
     for i, name in enumerate(names):
         stem = re.sub(r"[^0-9A-Za-z_-]+", "_", name) or "floor"
@@ -142,7 +153,8 @@ def _geojson(floor: Floor) -> bytes:
         _feature("Polygon", _rings(u.polygon), {"kind": "unit", "name": u.name, "category": u.category}, u.id)
         for u in floor.units
     ]
-    features.append(_feature("MultiLineString", floor.walls.reshape(-1, 2, 2).tolist(), {"kind": "walls"}))
+    for kind, segments in (("walls", floor.walls), ("barriers", floor.barriers)):
+        features.append(_feature("MultiLineString", segments.reshape(-1, 2, 2).tolist(), {"kind": kind}))
     head = '{"type": "FeatureCollection", "coordinates": "metres, x east, y north", "features": [\n'
     lines = ",\n".join(json.dumps(feature, ensure_ascii=False) for feature in features)
     return (head + lines + "\n]}\n").encode()
@@ -160,14 +172,17 @@ def _rings(polygon: Polygon) -> list[Any]:
 
 def _tables(floor: Floor) -> bytes:
     buffer = io.BytesIO()
-    arrays = floor.wall_index.arrays
+    indexes = {"wall": floor.wall_index, "barrier": floor.barrier_index}
+    tables: dict[str, Any] = {
+        f"{name}_{key}": table
+        for name, index in indexes.items()
+        for key, table in zip(WALL_TABLES, index.tables, strict=True)
+    }
     np.savez_compressed(
         buffer,
         mask=floor.walkable.mask,
         mask_frame=np.array([*floor.walkable.origin, floor.walkable.cell]),
-        clearance=arrays.clearance,
-        start=arrays.start,
-        index=floor.wall_index.index,
+        **tables,
     )
     return buffer.getvalue()
 
@@ -178,12 +193,15 @@ def _floor(folder: Path, entry: dict[str, Any]) -> Floor:
     derived_name = str(Path(drawn_name).with_suffix(".npz"))
     drawn = _checked(folder, drawn_name, files[drawn_name])
     derived = _checked(folder, derived_name, files[derived_name])
-    outline, units, walls = _parse_geojson(json.loads(drawn))
+    outline, units, segments = _parse_geojson(json.loads(drawn))
     try:
         with np.load(io.BytesIO(derived), allow_pickle=False) as tables:
             x, y, cell = tables["mask_frame"].tolist()
             walkable = Walkable((x, y), cell, tables["mask"])
-            index = WallIndex.from_tables(walls, tables["clearance"], tables["start"], tables["index"])
+            walls, barriers = (
+                WallIndex.from_tables(segments[f"{name}s"], *(tables[f"{name}_{key}"] for key in WALL_TABLES))
+                for name in ("wall", "barrier")
+            )
     except (OSError, EOFError, zipfile.BadZipFile) as error:
         raise MapError(f"damaged: {error}", where=folder / derived_name, remedy=ANEW) from error
     anchor = entry["anchor"]
@@ -195,9 +213,11 @@ def _floor(folder: Path, entry: dict[str, Any]) -> Floor:
         elevation=float(entry["elevation"]),
         outline=outline,
         units=units,
-        walls=walls,
+        walls=segments["walls"],
+        barriers=segments["barriers"],
         walkable=walkable,
-        wall_index=index,
+        wall_index=walls,
+        barrier_index=barriers,
         anchor=None if anchor is None else _anchor(anchor),
     )
 
@@ -211,14 +231,16 @@ def _checked(folder: Path, name: str, sha256: str) -> bytes:
     except OSError as error:
         raise MapError(f"missing or unreadable: {error.strerror}", where=path, remedy=ANEW) from error
     if _sha256(content) != sha256:
-        raise MapError(f"damaged or edited: its checksum is not that of {MANIFEST}", where=path, remedy=ANEW)
+        raise MapError(f"damaged or edited: its checksum is not in {MANIFEST}", where=path, remedy=ANEW)
     return content
 
 
-def _parse_geojson(collection: dict[str, Any]) -> tuple[tuple[Polygon, ...], tuple[Unit, ...], Array]:
+def _parse_geojson(
+    collection: dict[str, Any],
+) -> tuple[tuple[Polygon, ...], tuple[Unit, ...], dict[str, Array]]:
     outline: tuple[Polygon, ...] = ()
     units: list[Unit] = []
-    walls = np.empty((0, 4))
+    segments: dict[str, Array] = {}
     for feature in collection["features"]:
         properties, coordinates = feature["properties"], feature["geometry"]["coordinates"]
         match properties["kind"]:
@@ -227,9 +249,9 @@ def _parse_geojson(collection: dict[str, Any]) -> tuple[tuple[Polygon, ...], tup
             case "unit":
                 unit = Unit(feature["id"], properties["name"], properties["category"], _polygon(coordinates))
                 units.append(unit)
-            case "walls":
-                walls = np.array(coordinates, dtype=np.float64).reshape(-1, 4)
-    return outline, tuple(units), walls
+            case "walls" | "barriers" as kind:
+                segments[kind] = np.array(coordinates, dtype=np.float64).reshape(-1, 4)
+    return outline, tuple(units), segments
 
 
 def _polygon(rings: list[Any]) -> Polygon:

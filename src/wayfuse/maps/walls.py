@@ -113,6 +113,11 @@ class WallIndex:
         grid = np.array([*origin, 1 / CLEARANCE_CELL, CLEARANCE_UNIT, 1 / LIST_CELL, LONGEST_MOVE, nx])
         return cls(WallArrays(grid, clearance, start, segments[index], segments), index)
 
+    @property
+    def tables(self) -> tuple[NDArray[np.uint8], NDArray[np.int32], NDArray[np.int32]]:
+        """What `from_tables` takes after the walls."""
+        return self.arrays.clearance, self.arrays.start, self.index
+
     def crosses(self, x0: ArrayLike, y0: ArrayLike, x1: ArrayLike, y1: ArrayLike) -> BoolArray:
         """Whether moves (x0, y0) -> (x1, y1), (n,) m each, cross a wall; NaN crosses nothing."""
         from wayfuse.maps._kernels import crosses_many

@@ -13,6 +13,7 @@ What the plan does not hold: doors, stairs, lifts. Every edge of a unit is a wal
 
 from __future__ import annotations
 
+import html
 import json
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -23,7 +24,7 @@ import numpy as np
 from wayfuse.core.errors import MapError
 from wayfuse.core.frames import GeoAnchor
 from wayfuse.core.types import Array
-from wayfuse.maps.build import build_floor
+from wayfuse.maps.build import build_floor, nominal_elevation
 from wayfuse.maps.geometry import clean_polygons
 from wayfuse.maps.levels import parse_level, sort_key
 from wayfuse.maps.site import Floor, Polygon, Site, Unit
@@ -133,7 +134,8 @@ def import_site(folder: Path) -> tuple[Site, ImportReport]:
         )
     folders.sort(key=lambda p: sort_key(p.name))
     levels, warnings = _levels([p.name for p in folders])
-    built = [_import_floor(p, level) for p, level in zip(folders, levels, strict=True)]
+    elevations = [nominal_elevation(level, has_ground=0 in levels) for level in levels]
+    built = [_import_floor(*floor) for floor in zip(folders, levels, elevations, strict=True)]
     site = Site(
         name=folder.resolve().name,
         floors=tuple(floor for floor, _ in built),
@@ -159,7 +161,7 @@ def _levels(names: list[str]) -> tuple[list[int], list[str]]:
     return levels, warnings
 
 
-def _import_floor(folder: Path, level: int) -> tuple[Floor, FloorReport]:
+def _import_floor(folder: Path, level: int, elevation: float) -> tuple[Floor, FloorReport]:
     notes = _Notes()
     width, height = _size(folder / "floor_info.json")
     plan = folder / "geojson_map.json"
@@ -177,6 +179,7 @@ def _import_floor(folder: Path, level: int) -> tuple[Floor, FloorReport]:
         units,
         width=width,
         height=height,
+        elevation=elevation,
         anchor=None if frame is None else frame.anchor,
     )
     if not floor.walkable.mask.any():
@@ -245,7 +248,9 @@ def _units(feature: Any, number: int, frame: _Frame, notes: _Notes) -> list[Unit
                 high > np.add((frame.width, frame.height), OUTLINE_MARGIN)
             ):
                 notes.add(f"unit {ident}: reaches over the outline")
-            units.append(Unit(ident, str(properties.get("name") or ""), _category(properties), polygon))
+            units.append(
+                Unit(ident, html.unescape(str(properties.get("name") or "")), _category(properties), polygon)
+            )
     return units
 
 

@@ -1,0 +1,123 @@
+"""``wayfuse site``: import a building, draw its floors."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+if TYPE_CHECKING:
+    from wayfuse.maps.importers.ms_indoor import ImportReport
+    from wayfuse.maps.site import Site
+
+__all__ = ["site"]
+
+# name of a building format -> module of its importer: import_site(folder) -> (site, report)
+IMPORTERS = {"ms-indoor": "wayfuse.maps.importers.ms_indoor"}
+
+
+@click.group(context_settings={"help_option_names": ["-h", "--help"]})
+def site() -> None:
+    """Import and draw buildings."""
+
+
+@site.command("import")
+@click.argument("plan_format", metavar="FORMAT", type=click.Choice(sorted(IMPORTERS)))
+@click.argument("folder", metavar="DIR", type=click.Path(path_type=Path))
+@click.option("--out", required=True, type=click.Path(path_type=Path), help="Folder to write the site into.")
+@click.option("--overwrite", is_flag=True, help="Replace a site that is there already.")
+@click.option("--json", "as_json", is_flag=True, help="Print the floors as JSON.")
+def import_command(plan_format: str, folder: Path, out: Path, overwrite: bool, as_json: bool) -> None:
+    """Build a site from the floor plans in DIR.
+
+    FORMAT is ms-indoor: DIR holds one folder per floor (B1, F1, ...) with floor_info.json and
+    geojson_map.json.
+    """
+    import importlib
+
+    from wayfuse.maps.store import check_target
+
+    check_target(out, overwrite)
+    built, report = importlib.import_module(IMPORTERS[plan_format]).import_site(folder)
+    built.save(out, overwrite=overwrite)
+    _render(built, report, out, as_json)
+
+
+@site.command("show")
+@click.argument("folder", metavar="SITE", type=click.Path(path_type=Path))
+@click.option("--floor", "names", multiple=True, metavar="NAME", help="Only this floor; may be repeated.")
+@click.option(
+    "--out", type=click.Path(path_type=Path), help="Folder for the pictures (default: SITE/pictures)."
+)
+@click.option("--svg", is_flag=True, help="Write SVG instead of PNG.")
+def show_command(folder: Path, names: tuple[str, ...], out: Path | None, svg: bool) -> None:
+    """Draw each floor of SITE and print the paths of the pictures."""
+    from wayfuse.evaluation.plot_site import floor_figure, save_figure
+    from wayfuse.maps.site import Site
+    from wayfuse.maps.store import file_stems
+
+    loaded = Site.load(folder)
+    chosen = [loaded.floor_index(name) for name in names] or range(len(loaded.floors))
+    target = out or folder / "pictures"
+    _make_folder(target)
+    stems = file_stems(loaded.floor_names)
+    for i in chosen:
+        title = f"{loaded.name}  {loaded.floors[i].name}"
+        path = target / f"{stems[i]}{'.svg' if svg else '.png'}"
+        click.echo(save_figure(floor_figure(loaded.floors[i], title), path))
+
+
+def _make_folder(folder: Path) -> None:
+    from wayfuse.core.errors import UsageError
+
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise UsageError(
+            f"cannot make the folder: {error.strerror}", where=folder, remedy="name another"
+        ) from error
+
+
+def _rows(built: Site, report: ImportReport) -> list[dict[str, Any]]:
+    return [
+        {
+            "floor": floor.name,
+            "level": floor.level,
+            "width_m": round(floor.width, 2),
+            "height_m": round(floor.height, 2),
+            "elevation_m": floor.elevation,
+            "units": len(floor.units),
+            "walls": len(floor.walls),
+            "walkable_share": round(floor.walkable_share, 4),
+            "anchor_residual_m": None if note.residual is None else round(note.residual, 4),
+            "warnings": list(note.warnings),
+        }
+        for floor, note in zip(built.floors, report.floors, strict=True)
+    ]
+
+
+def _render(built: Site, report: ImportReport, out: Path, as_json: bool) -> None:
+    import json
+
+    rows = _rows(built, report)
+    if as_json:
+        document = {"site": built.name, "path": str(out), "floors": rows, "warnings": list(report.warnings)}
+        click.echo(json.dumps(document, indent=1, ensure_ascii=False))
+        return
+    click.echo(
+        f"{'floor':<8}{'level':>6}{'size (m)':>17}{'units':>7}{'walls':>7}{'walkable':>10}{'anchor off':>13}"
+    )
+    for row in rows:
+        size = f"{row['width_m']:.1f} x {row['height_m']:.1f}"
+        residual = row["anchor_residual_m"]
+        off = "no anchor" if residual is None else f"{residual * 1000:.1f} mm"
+        share = f"{100 * row['walkable_share']:.1f} %"
+        cells = f"{row['floor']:<8}{row['level']:>6}{size:>17}{row['units']:>7}{row['walls']:>7}"
+        click.echo(f"{cells}{share:>10}{off:>13}")
+    for warning in report.warnings:
+        click.echo(f"warning: {warning}", err=True)
+    for row in rows:
+        for warning in row["warnings"]:
+            click.echo(f"warning: floor {row['floor']}: {warning}", err=True)
+    click.echo(f"site {built.name} written to {out}")
