@@ -22,10 +22,8 @@ __all__ = ["Building", "Room", "Storey", "shopping_centre"]
 
 _WIDTH, _HEIGHT = 70.0, 45.0  # m
 _STOREY_HEIGHT = 5.0  # m, slab to slab: usual for shops
-_ANCHOR = (
-    11.0,
-    48.0,
-)  # degrees: a made-up place; at this latitude a forgotten cos(latitude) is a third too wide
+_LON, _LAT = 11.0, 48.0  # degrees: a made-up place, far enough north to show a forgotten cos(latitude)
+_METRES_PER_DEGREE = float(np.deg2rad(6378137.0))  # on the sphere by which the public plans measure
 _NODE_SPACING = 8.0  # m, largest gap between way-points: the public recordings state one about every 7 m
 
 
@@ -91,7 +89,10 @@ class Building:
 def shopping_centre(rng: np.random.Generator) -> Building:
     """Draw the two-storey shopping centre of the demo."""
     storeys = (_ground_floor(rng), _upper_floor(rng))
-    return Building("Wayfuse Demo Centre", storeys, _WIDTH, _HEIGHT, GeoAnchor.from_origin(*_ANCHOR))
+    middle = np.deg2rad(_LAT + 0.5 * _HEIGHT / _METRES_PER_DEGREE)
+    x, y = 1.0 / (_METRES_PER_DEGREE * float(np.cos(middle))), 1.0 / _METRES_PER_DEGREE
+    anchor = GeoAnchor((_LON, _LAT), ((x, 0.0), (0.0, y)))
+    return Building("Wayfuse Demo Centre", storeys, _WIDTH, _HEIGHT, anchor)
 
 
 def _ground_floor(rng: np.random.Generator) -> Storey:

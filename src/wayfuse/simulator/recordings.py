@@ -25,6 +25,7 @@ from wayfuse.simulator.simulate import DECIMALS
 __all__ = ["recording_text", "write_recording", "write_site"]
 
 _EARTH = 6378137.0  # m, radius of Web Mercator
+_SHOP, _VOID = "5d35733edb07255e495599ed", "5d357b7f0c02a37d6cc84c8a"  # category ids of the public plans
 _SENSORS = (
     ("acceleration", "TYPE_ACCELEROMETER"),
     ("magnetic_field", "TYPE_MAGNETIC_FIELD"),
@@ -130,7 +131,7 @@ def _feature_collection(building: Building, storey: Storey, number: int) -> dict
                 "id": _object_id(building.name, storey.name, room.name),
                 "name": room.name,
                 "display": room.name,
-                "category": [_object_id("void" if room in storey.voids else "shop")],
+                "category": [_VOID if room in storey.voids else _SHOP],
                 "point": _mercator(room.polygon.mean(axis=0), building.anchor),
                 "points": [],
             },
