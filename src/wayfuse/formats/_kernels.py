@@ -3,6 +3,10 @@
 The scanner parses the lines it knows strictly and hands every other line back for the careful Python path, so that
 both paths together equal the plain loop bit for bit: a decimal of at most 53 bits with a power of ten within 1e22 is
 exact after one multiplication or division (Clinger, How to Read Floating Point Numbers Accurately, PLDI 1990).
+
+Eight bytes are looked at together: ``word[i]`` is the little-endian integer of the bytes i ... i + 7 (an overlapping
+view that the wrapper makes), and line ends and tabs are counted by arithmetic on it (Lamport, Multiple Byte
+Processing with Full-Word Instructions, CACM 1975).
 """
 
 from __future__ import annotations
@@ -11,7 +15,7 @@ import numpy as np
 
 from wayfuse.core.jit import inline_kernel, kernel
 
-__all__ = ["KINDS", "NAMES", "mark_repeats", "scan_ms_indoor"]
+__all__ = ["KINDS", "mark_repeats", "scan_ms_indoor"]
 
 # Kinds by row: what the scanner parses (0-6), then what it only counts.
 KINDS = (
@@ -27,39 +31,89 @@ KINDS = (
     "MAGNETIC_FIELD_UNCALIBRATED",
     "BLU4",
 )
-NAMES = np.zeros((len(KINDS), 32), np.uint8)
-for _row, _name in enumerate(KINDS):
-    NAMES[_row, : len(_name)] = np.frombuffer(_name.encode(), np.uint8)
+_WIFI, _BLUE, _BEACON, _UNCALIBRATED, _BLU4 = 4, 5, 6, 7, 10
+_TAB, _NEWLINE, _MINUS, _DOT, _ZERO, _NINE, _COLON, _HASH, _E = 9, 10, 45, 46, 48, 57, 58, 35, 69
 
-_TAB, _NEWLINE, _MINUS, _DOT, _ZERO, _NINE, _COLON = 9, 10, 45, 46, 48, 57, 58
+# Each name as overlapping words: ``TYPE_WIFI<tab>`` is its first and its last eight bytes.
+_LENGTH = np.array([len(f"TYPE_{name}\t") for name in KINDS])
+_PLACES = np.minimum(np.arange(5) * 8, _LENGTH[:, None] - 8)
+_WORDS = np.array(
+    [
+        [int.from_bytes(f"TYPE_{name}\t".encode()[p : p + 8], "little") for p in places]
+        for name, places in zip(KINDS, _PLACES.tolist(), strict=True)
+    ],
+    np.uint64,
+)
+
+_U = np.uint64
+_LOW7, _HIGH, _ONES = _U(0x7F7F7F7F7F7F7F7F), _U(0x8080808080808080), _U(0x0101010101010101)
+_TABS, _NEWLINES = _U(0x0909090909090909), _U(0x0A0A0A0A0A0A0A0A)
+_NIBBLES, _THREES, _SIXES = _U(0xF0F0F0F0F0F0F0F0), _U(0x3333333333333333), _U(0x0606060606060606)
+
 _EXACT = 1 << 53  # integers up to here are float64
 _POWERS = 10.0 ** np.arange(23)  # all exact in float64
-_WIFI, _BLUE, _BEACON, _BLU4 = 4, 5, 6, 10
+_HEX = np.full(256, 255, np.uint8)
+for _digit in range(16):
+    _HEX[ord(f"{_digit:x}")] = _HEX[ord(f"{_digit:X}")] = _digit
 
 
 @inline_kernel
-def _kind_at(buf, i):  # type: ignore[no-untyped-def]
-    """Row of `KINDS` whose name stands at i, followed by a tab; -1 for any other."""
-    c = buf[i]
+def _equal_bytes(w, pattern):  # type: ignore[no-untyped-def]
+    """0x80 in every byte of a word that equals the pattern's."""
+    y = w ^ pattern
+    return ~(((y & _LOW7) + _LOW7) | y | _LOW7)
+
+
+@inline_kernel
+def _n_bytes(marks):  # type: ignore[no-untyped-def]
+    """Number of bytes marked with 0x80."""
+    return np.int64(((marks >> _U(7)) * _ONES) >> _U(56))
+
+
+@inline_kernel
+def _is_digits(w):  # type: ignore[no-untyped-def]
+    """Whether all eight bytes are decimal digits."""
+    return ((w & _NIBBLES) | (((w + _SIXES) & _NIBBLES) >> _U(4))) == _THREES
+
+
+@inline_kernel
+def _eight_digits(w):  # type: ignore[no-untyped-def]
+    """Integer of eight decimal digits, the first in the lowest byte."""
+    v = w & _U(0x0F0F0F0F0F0F0F0F)
+    v = (v * _U(2561)) >> _U(8)  # pairs: 10 a + b
+    v = ((v & _U(0x00FF00FF00FF00FF)) * _U(6553601)) >> _U(16)
+    v = ((v & _U(0x0000FFFF0000FFFF)) * _U(42949672960001)) >> _U(32)
+    return np.int64(v)
+
+
+@inline_kernel
+def _digits13(word, i):  # type: ignore[no-untyped-def]
+    """Integer of 13 digits at i (Unix time in ms), -1 for anything else."""
+    first, second = word[i], word[i + 5]
+    value = np.int64(-1)
+    if _is_digits(first) and _is_digits(second):
+        value = _eight_digits(first) * 100_000 + _eight_digits(second) % 100_000
+    return value
+
+
+@kernel
+def _kind_at(word, i):  # type: ignore[no-untyped-def]
+    """Row of `KINDS` whose name stands at i, a tab behind it; -1 for any other."""
+    head = word[i]
     kind = -1
-    if c == 65:  # A
-        kind = 0 if buf[i + 13] == _TAB else 7
-    elif c == 71:  # G
-        kind = 1 if buf[i + 9] == _TAB else 8
-    elif c == 77:  # M
-        kind = 2 if buf[i + 14] == _TAB else 9
-    elif c == 82:  # R
-        kind = 3
-    elif c == 87:  # W
-        kind = _WIFI
-    elif c == 66:  # B
-        kind = _BEACON if buf[i + 1] == 69 else (_BLUE if buf[i + 3] == 69 else _BLU4)
-    if kind >= 0:
-        j = 0
-        while NAMES[kind, j] != 0 and buf[i + j] == NAMES[kind, j]:
-            j += 1
-        if NAMES[kind, j] != 0 or buf[i + j] != _TAB:
-            kind = -1
+    for k in range(7):
+        if head == _WORDS[k, 0]:
+            kind = k
+            break
+    if kind < 0:
+        return -1
+    if kind < 3 and word[i + _PLACES[kind, 4]] != _WORDS[kind, 4]:
+        kind += _UNCALIBRATED
+    elif kind == _BLUE and word[i + 2] != _WORDS[_BLUE, 4]:
+        kind = _BLU4
+    for k in range(1, 5):
+        if word[i + _PLACES[kind, k]] != _WORDS[kind, k]:
+            return -1
     return kind
 
 
@@ -83,12 +137,10 @@ def _decimal(buf, i):  # type: ignore[no-untyped-def]
             mantissa = mantissa * 10 + np.int64(buf[i] - _ZERO)
             i += 1
         power = first - i
-        digits += i - first
-        if power == 0:
-            digits = 0
+        digits = digits - power if power else 0
     if digits == 0 or digits > 18 or mantissa > _EXACT:
         return 0.0, -1
-    if buf[i] == 69:  # E
+    if buf[i] == _E:
         i += 1
         down = buf[i] == _MINUS
         if down:
@@ -108,136 +160,133 @@ def _decimal(buf, i):  # type: ignore[no-untyped-def]
     return (-value if negative else value), i
 
 
-@inline_kernel
-def _digits13(buf, i):  # type: ignore[no-untyped-def]
-    """Integer of exactly 13 digits at i (the Unix time in ms), -1 for anything else."""
-    value = np.int64(0)
-    for j in range(13):
-        c = buf[i + j]
-        if c < _ZERO or c > _NINE:
-            value = np.int64(-1)
-            break
-        value = value * 10 + np.int64(c - _ZERO)
-    return value
-
-
-@inline_kernel
-def _nibble(c):  # type: ignore[no-untyped-def]
-    """Value of a hexadecimal digit, 255 for anything else."""
-    value = np.uint64(255)
-    if _ZERO <= c <= _NINE:
-        value = np.uint64(c - _ZERO)
-    elif 97 <= c <= 102:
-        value = np.uint64(c - 87)
-    elif 65 <= c <= 70:
-        value = np.uint64(c - 55)
-    return value
-
-
 @kernel
-def _address(buf, start, stop):  # type: ignore[no-untyped-def]
-    """48-bit hardware address in [start, stop) and whether it is one (``hh:hh:hh:hh:hh:hh``)."""
-    value = np.uint64(0)
-    if stop - start != 17:
-        return value, False
+def _address(buf, i):  # type: ignore[no-untyped-def]
+    """48-bit hardware address ``hh:hh:hh:hh:hh:hh`` at i; the top bit set where there is none."""
+    value, bad = _U(0), False
     for k in range(6):
-        high, low = _nibble(buf[start + 3 * k]), _nibble(buf[start + 3 * k + 1])
-        if high > np.uint64(15) or low > np.uint64(15) or (k < 5 and buf[start + 3 * k + 2] != _COLON):
-            return value, False
-        value = (value << np.uint64(8)) | (high << np.uint64(4)) | low
-    return value, True
+        high, low = _HEX[buf[i + 3 * k]], _HEX[buf[i + 3 * k + 1]]
+        bad = bad or (high | low) > 15 or (k < 5 and buf[i + 3 * k + 2] != _COLON)
+        value = (value << _U(8)) | (_U(high) << _U(4)) | _U(low)
+    return _U(1) << _U(63) if bad else value
+
+
+@inline_kernel
+def _field_start(buf, stop):  # type: ignore[no-untyped-def]
+    """Start of the field that ends before ``stop``."""
+    i = stop
+    while buf[i - 1] != _TAB:
+        i -= 1
+    return i
 
 
 @kernel
-def scan_ms_indoor(buf, line, t, values, ids, token, care, counts):  # type: ignore[no-untyped-def]
-    """Scan whole lines; ``buf`` ends with a line end and 64 bytes of zeros behind it.
+def _motion(buf, i, out):  # type: ignore[no-untyped-def]
+    """Three numbers and an accuracy from i; the place of the line end, -1 where the line is otherwise."""
+    for k in range(3):
+        value, i = _decimal(buf, i)
+        if i < 0 or buf[i] != _TAB:
+            return -1
+        out[k] = value
+        i += 1
+    if buf[i] == _MINUS:
+        i += 1
+    if _ZERO <= buf[i] <= _NINE and buf[i + 1] == _NEWLINE:
+        return i + 1
+    return -1
 
-    line, t : (7, m) out, line number from 1 and s. values : (7, m, 3) out. ids : (7, m) out, 0 where ``token``
-    holds the place. token : (m, 4) out, kind, row, start, stop of an identifier that is no address. care : (m, 3)
-    out, line, start, stop of lines for the careful path. counts : (13,) out, records per kind, tokens, care lines.
-    Returns the number of lines.
+
+@kernel
+def _radio(buf, word, kind, stop, n_tabs, out):  # type: ignore[no-untyped-def]
+    """Fields of a radio record from its line end backwards: place of the identifier, -1 where one is amiss."""
+    if kind == _WIFI:
+        if n_tabs != 6 or buf[stop - 14] != _TAB:
+            return -1, -1
+        seen = _digits13(word, stop - 13)
+        frequency_at = _field_start(buf, stop - 14)
+        rssi_at = _field_start(buf, frequency_at - 1)
+        frequency, j = _decimal(buf, frequency_at)
+        rssi, k = _decimal(buf, rssi_at)
+        if seen < 0 or j != stop - 14 or k != frequency_at - 1:
+            return -1, -1
+        out[0], out[1], out[2] = rssi, frequency, seen / 1000.0
+        return _field_start(buf, rssi_at - 1), rssi_at - 1
+    if kind == _BLUE:
+        rssi_at = _field_start(buf, stop)
+        rssi, k = _decimal(buf, rssi_at)
+        if n_tabs != 4 or k != stop:
+            return -1, -1
+        out[0], out[1] = rssi, np.nan
+        return _field_start(buf, rssi_at - 1), rssi_at - 1
+    if n_tabs == 9:  # the newer form repeats the time at the end
+        stop = _field_start(buf, stop) - 1
+    elif n_tabs != 8:
+        return -1, -1
+    start = _field_start(buf, stop)
+    rssi_at = _field_start(buf, _field_start(buf, start - 1) - 1)
+    power_at = _field_start(buf, rssi_at - 1)
+    power, j = _decimal(buf, power_at)
+    rssi, k = _decimal(buf, rssi_at)
+    if j != rssi_at - 1 or k < 0 or buf[k] != _TAB:
+        return -1, -1
+    out[0], out[1] = rssi, power
+    return start, stop
+
+
+@kernel
+def scan_ms_indoor(buf, word, n, line, t, values, ids, token, care, counts):  # type: ignore[no-untyped-def]
+    """Scan the whole lines in the first n bytes of ``buf``; at least 64 zeros follow them.
+
+    word : the overlapping view of ``buf``. line, t, ids : (7, m) out, line number from 1, s, identifier (0 where
+    ``token`` holds its place). values : (7, m, 3) out. token : (m, 4) out, kind, row, start, stop of an identifier
+    that is no address. care : (k, 3) out, line, start, stop of lines for the careful path. counts : (13,) in zeros,
+    out records per kind, tokens, care lines. Returns the number of lines.
     """
-    n = buf.size - 64
-    tabs = np.zeros(16, np.int64)
-    i = 0
-    number = 0
-    n_token = 0
-    n_care = 0
+    i, number, n_token, n_care = 0, 0, 0, 0
+    stamp_a, stamp_b, ms = _U(0), _U(0), np.int64(-1)
     while i < n:
         start = i
         number += 1
         kind = -1
-        ms = np.int64(-1)
-        if buf[i] != 35:  # '#'
-            ms = _digits13(buf, i)
-            if ms > 0 and buf[i + 13] == _TAB and buf[i + 14] == 84 and buf[i + 15] == 89:  # TY
-                if buf[i + 16] == 80 and buf[i + 17] == 69 and buf[i + 18] == 95:  # PE_
-                    kind = _kind_at(buf, i + 19)
+        if buf[i] != _HASH:
+            if word[i] != stamp_a or word[i + 5] != stamp_b:  # seven lines in a row share their time
+                stamp_a, stamp_b = word[i], word[i + 5]
+                ms = _digits13(word, i)
+            if ms >= 0 and buf[i + 13] == _TAB:
+                kind = _kind_at(word, i + 14)
         good = False
-        if 0 <= kind < 4:
-            row = counts[kind]
-            j = i + 19
-            while buf[j] != _TAB:
-                j += 1
-            good = True
-            for k in range(3):
-                value, j = _decimal(buf, j + 1)
-                if j < 0 or buf[j] != _TAB:
-                    good = False
-                    break
-                values[kind, row, k] = value
-            if good and _ZERO <= buf[j + 1] <= _NINE and buf[j + 2] == _NEWLINE:  # accuracy 0 ... 3
-                i = j + 2
-            elif good and buf[j + 1] == _MINUS and _ZERO <= buf[j + 2] <= _NINE and buf[j + 3] == _NEWLINE:
-                i = j + 3
-            else:
-                good = False
-                i = start
+        if 0 <= kind < _WIFI:
+            stop = _motion(buf, i + 14 + _LENGTH[kind], values[kind, counts[kind]])
+            good = stop >= 0
+            i = stop if good else i
         if not good:
             n_tabs = 0
-            while buf[i] != _NEWLINE:
-                if buf[i] == _TAB:
-                    if n_tabs < 16:
-                        tabs[n_tabs] = i
-                    n_tabs += 1
-                i += 1
-            first, last = 0, 0  # the identifier's place
-            if kind >= 7:
+            while True:
+                w = word[i]
+                ends, marks = _equal_bytes(w, _NEWLINES), _equal_bytes(w, _TABS)
+                if ends:
+                    below = (ends & (~ends + _U(1))) - _U(1)
+                    n_tabs += _n_bytes(marks & below)
+                    i += _n_bytes(below & _HIGH)
+                    break
+                n_tabs += _n_bytes(marks)
+                i += 8
+            if kind >= _UNCALIBRATED:
                 good = n_tabs == (4 if kind == _BLU4 else 8)
-            elif kind == _WIFI and n_tabs == 6:
+            elif kind >= _WIFI:
                 row = counts[kind]
-                rssi, j = _decimal(buf, tabs[3] + 1)
-                frequency, k = _decimal(buf, tabs[4] + 1)
-                seen = _digits13(buf, tabs[5] + 1)
-                good = j == tabs[4] and k == tabs[5] and seen >= 0 and tabs[5] + 14 == i
-                values[kind, row, 0], values[kind, row, 1], values[kind, row, 2] = rssi, frequency, seen / 1000.0
-                first, last = tabs[2] + 1, tabs[3]
-            elif kind == _BLUE and n_tabs == 4:
-                row = counts[kind]
-                rssi, j = _decimal(buf, tabs[3] + 1)
-                good = j == i
-                values[kind, row, 0], values[kind, row, 1] = rssi, np.nan
-                first, last = tabs[2] + 1, tabs[3]
-            elif kind == _BEACON and (n_tabs == 9 or n_tabs == 8):
-                row = counts[kind]
-                power, j = _decimal(buf, tabs[4] + 1)
-                rssi, k = _decimal(buf, tabs[5] + 1)
-                good = j == tabs[5] and k == tabs[6]
-                values[kind, row, 0], values[kind, row, 1] = rssi, power
-                first, last = tabs[7] + 1, tabs[8] if n_tabs == 9 else i
-            if good and kind < 7:
-                row = counts[kind]
-                identifier, plain = _address(buf, first, last)
-                ids[kind, row] = identifier
-                if last <= first:
-                    good = False
-                elif not plain:
-                    token[n_token, 0], token[n_token, 1] = kind, row
-                    token[n_token, 2], token[n_token, 3] = first, last
-                    n_token += 1
+                first, last = _radio(buf, word, kind, i, n_tabs, values[kind, row])
+                good = last > first
+                if good:
+                    identifier = _address(buf, first) if last - first == 17 else _U(1) << _U(63)
+                    if identifier >> _U(63):
+                        token[n_token, 0], token[n_token, 1] = kind, row
+                        token[n_token, 2], token[n_token, 3] = first, last
+                        n_token += 1
+                    ids[kind, row] = identifier
         if good:
             row = counts[kind]
-            if kind < 7:
+            if kind < _UNCALIBRATED:
                 line[kind, row] = number
                 t[kind, row] = ms / 1000.0
             counts[kind] = row + 1
@@ -245,8 +294,7 @@ def scan_ms_indoor(buf, line, t, values, ids, token, care, counts):  # type: ign
             care[n_care, 0], care[n_care, 1], care[n_care, 2] = number, start, i
             n_care += 1
         i += 1
-    counts[11] = n_token
-    counts[12] = n_care
+    counts[11], counts[12] = n_token, n_care
     return number
 
 

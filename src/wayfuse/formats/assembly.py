@@ -37,9 +37,9 @@ _RANGES: Mapping[str, tuple[int, float, float]] = {
     "beacon": (1, -127.0, 20.0),  # dBm
 }
 _NORM = 1e-3  # a quaternion's squared length may differ so much from 1: seven printed digits, with room
+_LATEST_S = 1e11  # s since 1970: the year 5138; beyond it the unit is mistaken
 _HIGHEST_MHZ = 100_000.0  # the 60 GHz band ends below
 _STALE_SPREAD_S = 1.0  # scans are delivered this evenly after their freshest reading
-_SERIES = ("acceleration", "rotation_rate", "magnetic_field", "pressure", "orientation")
 
 
 def assemble(
@@ -109,6 +109,10 @@ def _in_range(kind: str, column: Column, report: ReadReport) -> Column:
     """Drop records whose values are not finite or outside the sensor's range; unknown frequencies become 0."""
     k, low, high = _RANGES[kind]
     label = kind.replace("_", " ")
+    if len(column.t) and not (column.t.min() >= 0.0 and column.t.max() <= _LATEST_S):
+        timed = (column.t >= 0.0) & (column.t <= _LATEST_S)
+        count_lines(report, f"{label}: time not finite or out of range", column.line[~timed])
+        column = column.take(timed)
     values = column.values[:, :k]
     inside: BoolArray | None = None
     if len(values) and not (values.min() >= low and values.max() <= high):  # NaN fails both

@@ -16,6 +16,7 @@ References
 from __future__ import annotations
 
 import math
+import os
 import re
 from collections.abc import Iterator
 from pathlib import Path
@@ -33,8 +34,10 @@ from wayfuse.sensors.records import Waypoint, bssid_id
 
 __all__ = ["blocks", "read"]
 
-BLOCK_BYTES = 4 << 20
-_PADDING = bytes(64)  # zeros behind a block: the scanner looks ahead without asking where the block ends
+BLOCK_BYTES = 1 << 20
+_PADDING = 64  # zeros behind a block: the scanner looks ahead without asking where the block ends
+_SHORTEST_RECORD = 24  # bytes: time, tab, TYPE_BLUE, three tabs
+_FIRST_RADIO = 4  # index into _COLUMNS
 
 # What the columns of the scanner's kinds become; ``beacon`` is joined with ``ble`` once the file is whole.
 _COLUMNS = ("acceleration", "rotation_rate", "magnetic_field", "orientation", "wifi", "ble", "beacon")
@@ -78,61 +81,88 @@ def blocks(
 ) -> Iterator[Piece]:
     """Pieces of a log in file order, reading ``block_bytes`` at a time; ``report`` is filled on the way."""
     report = ReadReport(path=str(path)) if report is None else report
-    floor = ""
-    with Path(path).open("rb") as file:
-        tail = b""
-        while data := file.read(block_bytes):
-            data = tail + data
-            cut = data.rfind(b"\n") + 1
-            tail = data[cut:]
+    scanner = _Scanner(report)
+    with Path(path).open("rb", buffering=0) as file:
+        size = min(block_bytes, os.fstat(file.fileno()).st_size)
+        buffer, filled = bytearray(size + _PADDING), 0
+        while n := file.readinto(memoryview(buffer)[filled : len(buffer) - _PADDING]):
+            cut = buffer.rfind(b"\n", filled, filled + n) + 1
+            filled += n
             if cut:
-                piece = _piece(data[:cut], report, floor)
-                floor = piece.header.get("FloorName", floor)
-                yield piece
-        if tail:
-            yield _last_line(tail, report, floor)
+                tail = buffer[cut:filled]
+                yield scanner.scan(buffer, cut)
+                filled = len(tail)
+                buffer[:filled] = tail
+            if filled + _PADDING >= len(buffer):  # a line longer than the block
+                buffer = buffer + bytes(len(buffer))
+        if filled:
+            yield scanner.last_line(bytes(buffer[:filled]))
 
 
-def _piece(data: bytes, report: ReadReport, floor: str) -> Piece:
-    """Records of whole lines: the scanner's, and those it left to the careful path."""
-    buf = np.frombuffer(data + _PADDING, np.uint8)
-    m = data.count(b"\n") + 1
-    line, t, ids = np.empty((7, m), np.int64), np.empty((7, m)), np.empty((7, m), np.uint64)
-    values = np.empty((7, m, 3))
-    token, care = np.empty((m, 4), np.int64), np.empty((m, 3), np.int64)
-    counts = np.zeros(13, np.int64)
-    n_lines = scan_ms_indoor(buf, line, t, values, ids, token, care, counts)
-    known: dict[bytes, int] = {}
-    for kind, row, start, stop in token[: counts[11]].tolist():
-        text = data[start:stop]
-        if text not in known:
-            known[text] = bssid_id(text.decode("utf-8", "replace"))
-        ids[kind, row] = known[text]
-    careful = _Careful(report, floor)
-    for number, start, stop in care[: counts[12]].tolist():
-        careful.line(data[start:stop], report.n_lines + number)
-    columns = {}
-    for row, (kind, n) in enumerate(zip(_COLUMNS, counts[:7].tolist(), strict=True)):
-        if n:
-            columns[kind] = Column(
-                line[row, :n] + report.n_lines,
-                t[row, :n].copy(),
-                _shaped(kind, values[row, :n]),
-                ids[row, :n].copy() if row > 3 else ids[row, :0],
-            )
-    for name, n in zip(KINDS, counts[:11].tolist(), strict=True):
-        if n:
-            report.n_records[name] = report.n_records.get(name, 0) + n
-    report.n_lines += n_lines
-    return Piece(_merged(columns, careful.rows.columns()), careful.rows.waypoints, careful.header)
+class _Scanner:
+    """Runs the compiled scanner over the blocks of one file, in arrays that the blocks share."""
 
+    def __init__(self, report: ReadReport) -> None:
+        self._report, self._floor = report, ""
+        self._known: dict[bytes, int] = {}
+        self._size = 0
 
-def _last_line(data: bytes, report: ReadReport, floor: str) -> Piece:
-    """The last line, which has no line end: kept where it is whole, and counted."""
-    report.n_lines += 1
-    careful = _Careful(report, floor, truncated=True)
-    careful.line(data, report.n_lines)
-    return Piece(careful.rows.columns(), careful.rows.waypoints, careful.header)
+    def _allocate(self, size: int) -> None:
+        m = size // _SHORTEST_RECORD + 1
+        self._line, self._t = np.empty((7, m), np.int64), np.empty((7, m))
+        self._ids, self._values = np.empty((7, m), np.uint64), np.empty((7, m, 3))
+        self._token, self._care = np.empty((m, 4), np.int64), np.empty((size // 2 + 1, 3), np.int64)
+        self._size = size
+
+    def scan(self, buffer: bytearray, n: int) -> Piece:
+        """Records of the whole lines in the first n bytes: the scanner's, and those it left to the careful path."""
+        report = self._report
+        if n > self._size:
+            self._allocate(len(buffer))
+        kept = bytes(buffer[n : n + _PADDING])
+        buffer[n : n + _PADDING] = bytes(_PADDING)
+        buf = np.frombuffer(buffer, np.uint8)
+        word = np.ndarray((n + _PADDING - 8,), "<u8", buf, strides=(1,))  # type: ignore[call-overload]
+        counts = np.zeros(13, np.int64)
+        n_lines = scan_ms_indoor(
+            buf, word, n, self._line, self._t, self._values, self._ids, self._token, self._care, counts
+        )
+        self._name_tokens(buffer, int(counts[11]))
+        careful = _Careful(report, self._floor)
+        for number, start, stop in self._care[: counts[12]].tolist():
+            careful.line(bytes(buffer[start:stop]), report.n_lines + number)
+        del buf, word
+        buffer[n : n + _PADDING] = kept
+        for name, count in zip(KINDS, counts[:11].tolist(), strict=True):
+            if count:
+                report.n_records[name] = report.n_records.get(name, 0) + count
+        columns = {kind: self._column(row, int(counts[row])) for row, kind in enumerate(_COLUMNS) if counts[row]}
+        report.n_lines += int(n_lines)
+        self._floor = careful.header.get("FloorName", "")
+        return Piece(_merged(columns, careful.rows.columns()), careful.rows.waypoints, careful.header)
+
+    def last_line(self, data: bytes) -> Piece:
+        """The last line, which has no line end: kept where it is whole, and counted."""
+        self._report.n_lines += 1
+        careful = _Careful(self._report, self._floor, truncated=True)
+        careful.line(data, self._report.n_lines)
+        return Piece(careful.rows.columns(), careful.rows.waypoints, careful.header)
+
+    def _name_tokens(self, buffer: bytearray, n: int) -> None:
+        """Identifiers of BSSIDs that are no hardware address; each text is digested once."""
+        for kind, row, start, stop in self._token[:n].tolist():
+            text = bytes(buffer[start:stop])
+            if text not in self._known:
+                self._known[text] = _identifier(text)
+            self._ids[kind, row] = self._known[text]
+
+    def _column(self, row: int, n: int) -> Column:
+        return Column(
+            self._line[row, :n] + self._report.n_lines,
+            self._t[row, :n].copy(),
+            _shaped(_COLUMNS[row], self._values[row, :n]),
+            self._ids[row, : n if row >= _FIRST_RADIO else 0].copy(),
+        )
 
 
 def _shaped(kind: str, values: Array) -> Array:

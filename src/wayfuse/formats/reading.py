@@ -36,6 +36,14 @@ def read(path: str | Path, *, format: str | None = None, platform: str | None = 
         from wayfuse.formats import ms_indoor
 
         return ms_indoor.read(path)
+    if kind == "getsensordata":
+        from wayfuse.formats import getsensordata
+
+        return getsensordata.read(path)
+    if kind == "sensor-logger":
+        from wayfuse.formats import sensor_logger
+
+        return sensor_logger.read(path, platform=platform)
     raise UsageError(f"unknown format {kind!r}", where="format", remedy=f"use one of {', '.join(FORMATS)}")
 
 
