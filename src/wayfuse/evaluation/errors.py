@@ -25,6 +25,7 @@ from wayfuse.sensors.recording import Recording
 __all__ = [
     "FLOOR_PENALTY",
     "MISSING",
+    "NO_ESTIMATES",
     "MethodScores",
     "PointErrors",
     "Scores",
@@ -37,6 +38,11 @@ __all__ = [
 
 FLOOR_PENALTY = 15.0  # m per floor, rule of the IPIN and Microsoft indoor location competitions
 MISSING = ("skip", "backfill", "all")
+# Reasons why a walk is not scored
+NO_ESTIMATES = "recording without estimates"
+NO_RECORDING = "estimates without a recording"
+NO_WAYPOINTS = "recording without waypoints"
+NO_DEGREES = "waypoints in degrees, estimates without lat and lon (give --site)"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -122,9 +128,9 @@ class MethodScores:
 class Scores:
     """All methods over the same truth.
 
-    walks : names of the walks with truth. truths : by name. unscored : (name, reason) of what could not be
-    scored. notes : what the reader of the score should know. reports : what the recordings' readers met.
-    frame : in which places were compared.
+    walks : names of the walks with truth and an estimate of any method. truths : by name. unscored : (name,
+    reason) of what could not be scored. notes : what the reader of the score should know. reports : what the
+    recordings' readers met. frame : in which places were compared.
     """
 
     walks: tuple[str, ...]
@@ -229,7 +235,8 @@ def score(
     """
     frame = CommonFrame(site)
     tracks = _by_method(estimates, frame)
-    truths, unscored, notes, reports = _truths(recordings, frame)
+    tracked = {walk for of_method in tracks.values() for walk in of_method}
+    truths, unscored, notes, reports = _truths(recordings, frame, tracked)
     rows: dict[str, list[tuple[WalkEstimates, dict[str, PointErrors]]]] = {name: [] for name in tracks}
     for index, (walk, truth) in enumerate(truths.items()):
         grids = {at: _Grid.of(truth, at, frame, survey) for at in TIMES}
@@ -239,11 +246,9 @@ def score(
             if track is not None and xy is not None:
                 rows[name].append((track, {at: grids[at].errors(index, track, xy, frame) for at in TIMES}))
             elif track is not None:
-                reason = "waypoints in degrees, estimates without lat and lon: give --site"
-                unscored.append((f"{walk} ({name})", reason))
-    given = set(truths) | {name for name, _ in unscored}
-    lone = sorted({walk for of_method in tracks.values() for walk in of_method} - given)
-    unscored += [(walk, "estimates without a recording") for walk in lone]
+                unscored.append((f"{walk} ({name})", NO_DEGREES))
+    lone = tracked - set(truths) - {name for name, _ in unscored}
+    unscored += [(walk, NO_RECORDING) for walk in sorted(lone)]
     methods = tuple(_method_scores(name, scored, tuple(truths)) for name, scored in rows.items() if scored)
     if not methods:
         raise UsageError("no walk can be scored", remedy=_why_nothing(unscored))
@@ -275,7 +280,7 @@ def _by_method(
 
 
 def _truths(
-    recordings: Iterable[Recording], frame: CommonFrame
+    recordings: Iterable[Recording], frame: CommonFrame, tracked: set[str]
 ) -> tuple[dict[str, Truth], list[tuple[str, str]], list[str], list[str]]:
     truths: dict[str, Truth] = {}
     unscored: list[tuple[str, str]] = []
@@ -288,9 +293,9 @@ def _truths(
             raise UsageError(what, remedy="score them one after the other")
         paths[recording.name] = recording.path
         reports += recording.report.describe()
-        truth = truth_of(recording, frame)
+        truth = truth_of(recording, frame) if recording.name in tracked else None
         if truth is None:
-            unscored.append((recording.name, "no waypoints"))
+            unscored.append((recording.name, NO_WAYPOINTS if recording.name in tracked else NO_ESTIMATES))
             continue
         truths[recording.name] = truth
         if not truth.has_radio:

@@ -1,0 +1,244 @@
+"""The picture of one walk: floor plan, truth with its waypoints, the estimates of each method, 95 % ellipses.
+
+One panel per floor of the truth. An estimate on another floor than the truth is no part of the line: it is a
+cross at the place below or above it.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wayfuse.core.types import Array
+from wayfuse.evaluation.errors import MethodScores, Scores, summarise
+from wayfuse.evaluation.estimates_file import WalkEstimates
+from wayfuse.evaluation.plots import INK, new_figure, style
+from wayfuse.evaluation.truth import Truth
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from wayfuse.maps.site import Floor, Site
+
+__all__ = ["walk_figure"]
+
+_MAX_PANELS = 4
+_MARGIN, _LEAST = 8.0, 40.0  # m around what is shown, and the least extent shown
+_N_ELLIPSES = 7  # per method and walk
+_RHO95 = 2.4477468306808166  # radius in standard deviations that holds 95 % of a Gaussian in the plane
+_OVER = 10.0  # z-order of what lies over the plan
+_TRUTH = "#111111"
+
+
+def walk_figure(scores: Scores, walk: str, site: Site | None = None) -> Figure:
+    """Figure of one walk of a scoring."""
+    truth = scores.truths[walk]
+    names = list(dict.fromkeys(truth.floor.tolist()))[:_MAX_PANELS]
+    boxes = [_window(scores, truth, name) for name in names]
+    figure = new_figure(*_size(boxes))
+    for k, (name, box) in enumerate(zip(names, boxes, strict=True)):
+        ax = figure.add_subplot(1, len(names), k + 1)
+        _plan(ax, site, name, truth, box)
+        _truth(ax, truth, name, _shift(scores, name))
+        for index, method in enumerate(scores.methods):
+            _estimates(ax, scores, method, index, truth, name)
+        _marks(ax, truth, name, _shift(scores, name))
+    length = float(np.sum(np.hypot(*np.diff(truth.xy, axis=0).T)))
+    title = f"{walk}: {length:.0f} m in {truth.t[-1] - truth.t[0]:.0f} s"
+    first = figure.axes[0]
+    first.set_title(
+        f"{title}\n{first.get_title(loc='left')}", loc="left", fontsize=10, color=INK, parse_math=False
+    )
+    _legend(figure)
+    return figure
+
+
+def _size(boxes: list[tuple[Array, Array]]) -> tuple[float, float]:
+    """Inches of a figure with a panel per box, in the boxes' shape."""
+    low, high = boxes[0]
+    ratio = float(np.clip((high[1] - low[1]) / (high[0] - low[0]), 0.45, 1.5))
+    width = 9.0 if len(boxes) == 1 else 5.6 * len(boxes)
+    return width, width / len(boxes) * ratio + 1.1
+
+
+def _shift(scores: Scores, floor: str) -> Array:
+    """Offset (2,) from the common frame to that of a floor."""
+    return np.asarray(-scores.frame.shift(np.array([floor]))[0])
+
+
+def _common_xy(scores: Scores, track: WalkEstimates, truth: Truth) -> Array | None:
+    if truth.plane is None:
+        return np.asarray(track.xy + scores.frame.shift(track.floor))
+    return truth.plane.to_xy(track.lonlat) if np.all(np.isfinite(track.lonlat)) else None
+
+
+def _track(method: MethodScores, walk: str) -> WalkEstimates | None:
+    return next((track for track in method.tracks if track.walk == walk), None)
+
+
+def _true_floor(truth: Truth, t: Array) -> NDArray[np.str_]:
+    return truth.at(np.clip(t, truth.t[0], truth.t[-1]))[1]
+
+
+def _window(scores: Scores, truth: Truth, floor: str) -> tuple[Array, Array]:
+    """Corners (m, floor's frame) of what is shown: truth and most of the estimates while it is on the
+    floor."""
+    shift = _shift(scores, floor)
+    places = [truth.xy[truth.floor == floor] + shift]
+    for method in scores.methods:
+        track = _track(method, truth.walk)
+        xy = None if track is None else _common_xy(scores, track, truth)
+        if track is not None and xy is not None:
+            here = xy[_true_floor(truth, track.t) == floor] + shift
+            if len(here):
+                places.append(np.percentile(here, (5, 95), axis=0))  # an outlier is not to shrink the rest
+    every = np.concatenate(places)
+    low, high = every.min(axis=0) - _MARGIN, every.max(axis=0) + _MARGIN
+    grow = np.maximum(0.5 * (_LEAST - (high - low)), 0.0)
+    return low - grow, high + grow
+
+
+def _plan(ax: Axes, site: Site | None, name: str, truth: Truth, box: tuple[Array, Array]) -> None:
+    """Floor plan, or an empty sheet in metres, zoomed to the box, with a scale bar."""
+    floor = _floor(site, name) if truth.plane is None else None
+    if floor is not None:
+        from wayfuse.evaluation.plot_site import draw_floor
+
+        draw_floor(ax, floor)
+    else:
+        ax.grid(visible=True, color="#e4e4e4", linewidth=0.5)
+        ax.tick_params(labelsize=8)
+        ax.set_xlabel(
+            "x (m)" if truth.plane is None else "east of the first waypoint (m)", fontsize=8, color=INK
+        )
+        ax.set_ylabel(
+            "y (m)" if truth.plane is None else "north of the first waypoint (m)", fontsize=8, color=INK
+        )
+    ax.set_aspect("equal")
+    ax.set_xlim(box[0][0], box[1][0])
+    ax.set_ylim(box[0][1], box[1][1])
+    ax.set_title(
+        f"floor {name}" if name else "floor unknown", loc="left", fontsize=10, color=INK, parse_math=False
+    )
+    _scale_bar(ax, box)
+
+
+def _floor(site: Site | None, name: str) -> Floor | None:
+    floors = () if site is None else site.floors
+    return next((floor for floor in floors if floor.name.casefold() == name.casefold()), None)
+
+
+def _scale_bar(ax: Axes, box: tuple[Array, Array]) -> None:
+    width = float(box[1][0] - box[0][0])
+    length = max(n for n in (1, 2, 5, 10, 20, 50, 100, 200, 500) if n <= max(1.0, 0.22 * width))
+    x, y = box[0] + 0.03 * (box[1] - box[0])
+    ax.plot([x, x + length], [y, y], color=INK, linewidth=2.4, solid_capstyle="butt", zorder=_OVER + 6)
+    ax.annotate(f"{length} m", (x + 0.5 * length, y), (0, 3), textcoords="offset points", ha="center",
+                fontsize=8, color=INK, zorder=_OVER + 6)  # fmt: skip
+
+
+def _broken(xy: Array, shown: Any) -> Array:
+    """Places with NaN where not shown, so that a line breaks there."""
+    return np.where(np.asarray(shown)[:, None], xy, np.nan)
+
+
+def _truth(ax: Axes, truth: Truth, floor: str, shift: Array) -> None:
+    xy = _broken(truth.xy + shift, truth.floor == floor)
+    ax.plot(*xy.T, color="white", linewidth=4.5, zorder=_OVER, solid_capstyle="round")
+    ax.plot(*xy.T, color=_TRUTH, linewidth=2.0, zorder=_OVER + 1, label="truth, waypoints", marker="o",
+            markersize=5.5, markerfacecolor="white", markeredgecolor=_TRUTH)  # fmt: skip
+
+
+def _marks(ax: Axes, truth: Truth, floor: str, shift: Array) -> None:
+    """Start and end of the truth."""
+    for row, text, symbol in ((0, "start", "^"), (-1, "end", "s")):
+        if truth.floor[row] != floor:
+            continue
+        x, y = truth.xy[row] + shift
+        ax.plot([x], [y], symbol, color=_TRUTH, markersize=9, markeredgecolor="white", zorder=_OVER + 7)
+        box = {"boxstyle": "round,pad=0.15", "fc": "white", "ec": "none", "alpha": 0.8}
+        ax.annotate(text, (x, y), (7, 7), textcoords="offset points", fontsize=9, color=_TRUTH,
+                    zorder=_OVER + 8, bbox=box)  # fmt: skip
+
+
+def _estimates(ax: Axes, scores: Scores, method: MethodScores, index: int, truth: Truth, floor: str) -> None:
+    track = _track(method, truth.walk)
+    xy = None if track is None else _common_xy(scores, track, truth)
+    if track is None or xy is None:
+        return
+    xy = xy + _shift(scores, floor)
+    look = style(index) | ({} if index == 0 else {"linewidth": 1.2, "alpha": 0.8})
+    here = _true_floor(truth, track.t) == floor
+    right = scores.frame.steps(track.floor, np.full(len(track), floor)) == 0
+    right = right | (floor == "")
+    label = f"{method.name}: {_error_text(scores, method, truth.walk)}"
+    over = _OVER + 4 - 0.1 * index  # the first method on top
+    ax.plot(*_broken(xy, here & right).T, marker=".", markersize=4, zorder=over, label=label, **look)
+    wrong = here & ~right
+    if wrong.any():
+        ax.plot(*xy[wrong].T, "x", color=look["color"], markersize=6, zorder=over,
+                label=f"{method.name}: on another floor")  # fmt: skip
+    if method is _with_covariance(scores) and truth.plane is None:
+        _ellipses(ax, track, xy, here, look["color"], method.name)
+
+
+def _with_covariance(scores: Scores) -> MethodScores | None:
+    """The first method that states covariances: ellipses of several would hide the paths."""
+    stated = (m for m in scores.methods if np.any(np.isfinite(m.points["1hz"].cov)))
+    return next(stated, None)
+
+
+def _ellipses(ax: Axes, track: WalkEstimates, xy: Array, here: Any, colour: str, name: str) -> None:
+    """95 % ellipses of the stated covariance, spread over the walk."""
+    from matplotlib.patches import Ellipse
+
+    xx, yy, cross = (track.number(name) for name in ("var_x", "var_y", "cov_xy"))
+    rows = np.unique(np.linspace(0, len(track) - 1, _N_ELLIPSES).round().astype(int))
+    drawn = False
+    for i in rows[here[rows]]:
+        matrix = np.array([[xx[i], cross[i]], [cross[i], yy[i]]])
+        if not np.all(np.isfinite(matrix)):
+            continue
+        values, vectors = np.linalg.eigh(matrix)
+        if values[0] < 0:
+            continue
+        width, height = 2.0 * _RHO95 * np.sqrt(values[::-1])
+        angle = float(np.degrees(np.arctan2(vectors[1, 1], vectors[0, 1])))
+        look = {"facecolor": "none", "edgecolor": colour, "linewidth": 0.9, "alpha": 0.75}
+        ax.add_patch(Ellipse(tuple(xy[i]), width, height, angle=angle, zorder=_OVER + 2, **look))
+        ax.plot(*xy[i], "o", color=colour, markersize=4, zorder=_OVER + 4)
+        drawn = True
+    if drawn:  # an ellipse in the legend would be a box: a ring without a place stands for it
+        ax.plot(
+            [],
+            [],
+            "o",
+            color=colour,
+            markersize=9,
+            markerfacecolor="none",
+            label=f"{name}: 95 % ellipses as stated",
+        )
+
+
+def _error_text(scores: Scores, method: MethodScores, walk: str) -> str:
+    points = method.points["1hz"].used()
+    of = summarise(points.select(points.walk == scores.walks.index(walk)))
+    if not of.n:
+        return "no estimate at the evaluation times"
+    floor = "" if np.isnan(of.floor_accuracy) else f", floor {100 * of.floor_accuracy:.0f} %"
+    return f"mean {of.mean:.1f} m, median {of.p50:.1f} m{floor}"
+
+
+def _legend(figure: Figure) -> None:
+    entries: dict[str, Any] = {}
+    for ax in figure.axes:
+        handles, labels = ax.get_legend_handles_labels()
+        entries |= dict(zip(labels, handles, strict=True))
+    legend = figure.legend(
+        entries.values(), entries.keys(), loc="outside lower left", ncols=2, fontsize=8.5, frameon=False
+    )
+    for text in legend.get_texts():
+        text.set_parse_math(False)
