@@ -1,8 +1,12 @@
-"""The inertial front end: motion records in, steps out; streaming, causal, one sample or an array at a time.
+"""The inertial front end: motion records in, steps out; streaming and causal, a record or an array at a time.
+
+A step is a fold of the memory of the filters over the records (Acceleration, RotationRate, MagneticField,
+Orientation; others pass by). Both ways of feeding give the same bits. Bad data never stop it: records that
+are not finite or come late are left out; a gap of a second starts the filters afresh; a missing sensor is
+replaced (`heading`, `attitude`). Without an accelerometer there are no steps.
 
 >>> front_end = InertialFrontEnd()
->>> state = front_end.init()
->>> state, event = front_end.step(state, Acceleration(0.0, 0.0, 0.0, 9.81))
+>>> state, event = front_end.step(front_end.init(), Acceleration(0.0, 0.0, 0.0, 9.81))
 >>> event is None
 True
 """
@@ -10,25 +14,19 @@ True
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
-from wayfuse.core.errors import ConfigError
 from wayfuse.core.types import Array
-from wayfuse.inertial import _kernels as k
-from wayfuse.inertial.step_length import DEFAULT, StepLengthModel
+from wayfuse.inertial import _kernels
+from wayfuse.inertial import _layout as at
+from wayfuse.inertial.config import InertialConfig
+from wayfuse.inertial.step_length import DEFAULT, StepFeatures, StepLengthModel
 from wayfuse.sensors.recording import Recording, Series
 from wayfuse.sensors.records import Acceleration, MagneticField, Orientation, Record, RotationRate
 
-__all__ = ["FrontEndState", "InertialConfig", "InertialFrontEnd", "StepEvent", "StepEvents"]
-
-_KIND = {
-    Acceleration: k.ACCELERATION,
-    RotationRate: k.ROTATION_RATE,
-    MagneticField: k.MAGNETIC_FIELD,
-    Orientation: k.ORIENTATION,
-}
+__all__ = ["FrontEndState", "InertialConfig", "InertialFrontEnd", "StepEvent", "StepEvents", "contiguous"]
 
 
 class StepEvent(NamedTuple):
@@ -46,13 +44,16 @@ class StepEvent(NamedTuple):
 
 
 class StepEvents(NamedTuple):
-    """Steps of a stretch of a recording, each field (n,) float64.
+    r"""Steps of a stretch of a recording, each field (n,) float64.
 
     t : time at which the step is declared (s); nothing later is used.
-    length : m. heading : walking direction, rad counter-clockwise from east, in (-pi, pi].
-    duration : time since the previous step (s). peak, valley : extremes of the band-passed \\|a\\| (m/s²).
-    mean_abs : mean of its absolute value (m/s²). turn : gyro yaw since the previous step (rad).
-    confidence : 0 to 1.
+    length : m.
+    heading : direction of the phone about 0.2 s before, rad counter-clockwise from east, in (-pi, pi];
+    relative to an unknown start while no absolute heading has been seen
+    (`FrontEndState.is_heading_absolute`). duration : s since the previous step; 0.55 s for the first of a
+    bout. peak, valley, mean_abs : of the band-passed \|a\| over the step, m/s².
+    turn : gyro yaw since the previous step, rad.
+    confidence : in (0, 1]: lower for steps barely above the threshold and for the first of a bout.
     """
 
     t: Array
@@ -67,58 +68,24 @@ class StepEvents(NamedTuple):
 
 
 class FrontEndState(NamedTuple):
-    """What the next record needs: one vector, never changed in place."""
+    """What the next record needs: one vector, never changed in place: a state is its own checkpoint."""
 
     memory: Array
 
+    @property
+    def is_heading_absolute(self) -> bool:
+        """Whether a rotation vector or a usable magnetic field has been seen."""
+        return bool(self.memory[at.S_HAS_HEADING])
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class InertialConfig:
-    """Parameters of the front end (SI units)."""
+    @property
+    def heading(self) -> float:
+        """Direction of the phone now, rad counter-clockwise from east."""
+        return float(self.memory[at.S_HEADING])
 
-    low_hz: float = 0.7
-    high_hz: float = 3.0
-    threshold: float = 0.6
-    relative_threshold: float = 0.3
-    level_rate: float = 0.2
-    min_interval: float = 0.28
-    max_gap: float = 1.0
-    heading_delay: float = 0.2
-    heading_source: Literal["orientation", "pulled"] = "pulled"
-    heading_tau: float = 10.0
-    tilt_tau: float = 3.0
-    tilt_tau_no_gyro: float = 0.5
-    magnetic_tau: float = 5.0
-    magnetic_tau_no_gyro: float = 0.5
-    magnetic_tolerance: float = 5.0
-    stale_after: float = 0.5
-    max_peak: float = 9.0
-
-    def __post_init__(self) -> None:
-        if not 0.0 < self.low_hz < self.high_hz:
-            raise ConfigError("low_hz and high_hz must satisfy 0 < low_hz < high_hz", where="InertialConfig")
-        for name in ("threshold", "min_interval", "max_gap", "heading_tau", "tilt_tau", "magnetic_tau"):
-            if not getattr(self, name) > 0.0:
-                raise ConfigError(f"{name} must be positive", where="InertialConfig")
-
-    def parameters(self, model: StepLengthModel) -> Array:
-        """The vector the kernels read."""
-        p = np.zeros(k.N_PARAM)
-        p[k.P_LOW], p[k.P_HIGH], p[k.P_THRESHOLD] = self.low_hz, self.high_hz, self.threshold
-        p[k.P_RELATIVE], p[k.P_INTERVAL], p[k.P_GAP] = (
-            self.relative_threshold,
-            self.min_interval,
-            self.max_gap,
-        )
-        p[k.P_LEVEL_RATE], p[k.P_DELAY] = self.level_rate, self.heading_delay
-        p[k.P_SOURCE], p[k.P_TAU_HEADING] = float(self.heading_source == "pulled"), self.heading_tau
-        p[k.P_TAU_TILT], p[k.P_TAU_TILT_NO_GYRO] = self.tilt_tau, self.tilt_tau_no_gyro
-        p[k.P_TAU_MAG], p[k.P_TAU_MAG_NO_GYRO] = self.magnetic_tau, self.magnetic_tau_no_gyro
-        p[k.P_MAG_TOLERANCE], p[k.P_STALE] = self.magnetic_tolerance, self.stale_after
-        p[k.P_MAX_PEAK], p[k.P_MODEL] = self.max_peak, model.code
-        coefficients = model.coefficients
-        p[k.P_COEFFICIENT : k.P_COEFFICIENT + len(coefficients)] = coefficients
-        return p
+    @property
+    def last_step(self) -> float:
+        """Time of the last step (s), -inf before the first."""
+        return float(self.memory[at.S_T_STEP])
 
 
 @dataclass(frozen=True, slots=True)
@@ -140,50 +107,59 @@ class InertialFrontEnd:
 
     def init(self) -> FrontEndState:
         """State before the first record."""
-        s = np.zeros(k.N_STATE)
-        s[k.S_Q] = 1.0
-        s[k.S_RV] = 1.0
-        s[k.S_T_ACC : k.S_T_RV + 1] = -np.inf
-        s[k.S_T_STEP] = -np.inf
-        return FrontEndState(s)
+        return FrontEndState(at.initial_state())
 
     def step(self, state: FrontEndState, record: Record) -> tuple[FrontEndState, StepEvent | None]:
-        """Feed one record; a step where the record completes one. Records of other kinds are ignored."""
-        kind = _KIND.get(type(record))
-        if kind is None:
+        """Feed one record; a step where the record completes one. Records of other kinds change nothing."""
+        if isinstance(record, Orientation):
+            kind, t, (a, b, c, d) = at.ORIENTATION, record.t, record[1:]
+        elif isinstance(record, Acceleration | RotationRate | MagneticField):
+            kind, t, (a, b, c), d = _KIND[type(record)], record.t, record[1:], 0.0
+        else:
             return state, None
-        t, a, b, c, d = (*record, 0.0)[:5]  # type: ignore[misc]
-        memory, event = state.memory.copy(), np.empty(k.N_EVENT)
-        if k.consume(memory, self._parameters, kind, t, a, b, c, d, event):
-            return FrontEndState(memory), StepEvent(*event[: k.E_CONFIDENCE + 1].tolist())
+        memory, event = state.memory.copy(), np.empty(at.N_EVENT)
+        if _kernels.consume(memory, self._parameters, kind, t, a, b, c, d, event):
+            return FrontEndState(memory), StepEvent(*event[: at.E_CONFIDENCE + 1].tolist())
         return FrontEndState(memory), None
 
     def run(
         self, state: FrontEndState, recording: Recording, start: float = -np.inf, stop: float = np.inf
     ) -> tuple[FrontEndState, StepEvents]:
         """Feed the records with start < t <= stop; the same bits as feeding them to `step` one by one."""
-        state, rows = self.run_features(state, recording, start, stop)
-        return state, StepEvents(*(np.ascontiguousarray(rows[:, i]) for i in range(k.E_CONFIDENCE + 1)))
+        state, rows = self._rows(state, recording, start, stop)
+        return state, StepEvents(*rows[: at.E_CONFIDENCE + 1])
 
-    def run_features(
+    def run_with_features(
         self, state: FrontEndState, recording: Recording, start: float = -np.inf, stop: float = np.inf
+    ) -> tuple[FrontEndState, StepEvents, StepFeatures]:
+        """As `run`, with the features that step-length models are fitted on."""
+        state, rows = self._rows(state, recording, start, stop)
+        order = (at.E_DURATION, at.E_PEAK, at.E_VALLEY, at.E_MEAN_ABS, at.E_VERTICAL)
+        return state, StepEvents(*rows[: at.E_CONFIDENCE + 1]), StepFeatures(*rows[list(order)])
+
+    def _rows(
+        self, state: FrontEndState, recording: Recording, start: float, stop: float
     ) -> tuple[FrontEndState, Array]:
-        """As `run`, but the raw rows of the kernel (n, N_EVENT): for fitting step-length models."""
         memory = state.memory.copy()
-        series = (
-            recording.acceleration,
-            recording.rotation_rate,
-            recording.magnetic_field,
-            recording.orientation,
-        )
-        columns = [column for s in series for column in _columns(s.between(start, stop))]
-        events = np.empty((len(columns[0]) + 1, k.N_EVENT))
-        n = k.consume_series(memory, self._parameters, *columns, events)
-        return FrontEndState(memory), events[:n].copy()
+        columns = contiguous(recording, start, stop)
+        events = np.empty((len(columns[0]) + 1, at.N_EVENT))
+        n = _kernels.consume_series(memory, self._parameters, columns, events, np.empty((0, 5)))
+        return FrontEndState(memory), np.ascontiguousarray(events[:n].T)
 
 
-def _columns(series: Series) -> tuple[Array, Array]:
-    return (
-        np.require(series.t, np.float64, ("C", "W")),
-        np.require(series.values, np.float64, ("C", "W")),
-    )
+_KIND = {
+    Acceleration: at.ACCELERATION,
+    RotationRate: at.ROTATION_RATE,
+    MagneticField: at.MAGNETIC_FIELD,
+}
+
+
+def contiguous(recording: Recording, start: float = -np.inf, stop: float = np.inf) -> tuple[Array, ...]:
+    """Times and values of the four motion series within start < t <= stop, as the kernels take them."""
+    r = recording
+    parts: list[Array] = []
+    for series in (r.acceleration, r.rotation_rate, r.magnetic_field, r.orientation):
+        part: Series = series.between(start, stop)
+        # one memory layout, one compiled version: read-only and strided arrays are copied
+        parts += [np.require(column, np.float64, ("C", "W")) for column in (part.t, part.values)]
+    return tuple(parts)
