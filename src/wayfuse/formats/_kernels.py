@@ -1,21 +1,28 @@
 """Byte scanner of ms-indoor logs, and the test for repeated Wi-Fi readings.
 
-The scanner parses the lines it knows strictly and hands every other line back for the careful Python path, so that
-both paths together equal the plain loop bit for bit: a decimal of at most 53 bits with a power of ten within 1e22 is
-exact after one multiplication or division (Clinger, How to Read Floating Point Numbers Accurately, PLDI 1990).
+The scanner parses the lines it knows strictly and hands every other line back for the careful Python path, so
+that both paths together equal the plain loop bit for bit: a decimal of at most 53 bits with a power of ten
+within 1e22 is exact after one multiplication or division (Clinger, How to Read Floating Point Numbers
+Accurately, PLDI 1990).
 
-Eight bytes are looked at together: ``word[i]`` is the little-endian integer of the bytes i ... i + 7 (an overlapping
-view that the wrapper makes), and line ends and tabs are counted by arithmetic on it (Lamport, Multiple Byte
-Processing with Full-Word Instructions, CACM 1975).
+Eight bytes are looked at together: ``word[i]`` is the little-endian integer of the bytes i ... i + 7 (an
+overlapping view that the wrapper makes), and line ends and tabs are counted by arithmetic on it (Lamport,
+Multiple Byte Processing with Full-Word Instructions, CACM 1975).
 """
 
 from __future__ import annotations
 
+from typing import Any, TypeAlias
+
 import numpy as np
+from numpy.typing import NDArray
 
 from wayfuse.core.jit import inline_kernel, kernel
+from wayfuse.core.types import Array, BoolArray, IdArray, IntArray
 
 __all__ = ["KINDS", "mark_repeats", "scan_ms_indoor"]
+
+Bytes: TypeAlias = NDArray[np.uint8]
 
 # Kinds by row: what the scanner parses (0-6), then what it only counts.
 KINDS = (
@@ -58,26 +65,26 @@ for _digit in range(16):
 
 
 @inline_kernel
-def _equal_bytes(w, pattern):  # type: ignore[no-untyped-def]
+def _equal_bytes(w: Any, pattern: Any) -> Any:
     """0x80 in every byte of a word that equals the pattern's."""
     y = w ^ pattern
     return ~(((y & _LOW7) + _LOW7) | y | _LOW7)
 
 
 @inline_kernel
-def _n_bytes(marks):  # type: ignore[no-untyped-def]
+def _n_bytes(marks: Any) -> Any:
     """Number of bytes marked with 0x80."""
     return np.int64(((marks >> _U(7)) * _ONES) >> _U(56))
 
 
 @inline_kernel
-def _is_digits(w):  # type: ignore[no-untyped-def]
+def _is_digits(w: Any) -> Any:
     """Whether all eight bytes are decimal digits."""
     return ((w & _NIBBLES) | (((w + _SIXES) & _NIBBLES) >> _U(4))) == _THREES
 
 
 @inline_kernel
-def _eight_digits(w):  # type: ignore[no-untyped-def]
+def _eight_digits(w: Any) -> Any:
     """Integer of eight decimal digits, the first in the lowest byte."""
     v = w & _U(0x0F0F0F0F0F0F0F0F)
     v = (v * _U(2561)) >> _U(8)  # pairs: 10 a + b
@@ -87,7 +94,7 @@ def _eight_digits(w):  # type: ignore[no-untyped-def]
 
 
 @inline_kernel
-def _digits13(word, i):  # type: ignore[no-untyped-def]
+def _digits13(word: IdArray, i: int) -> Any:
     """Integer of 13 digits at i (Unix time in ms), -1 for anything else."""
     first, second = word[i], word[i + 5]
     value = np.int64(-1)
@@ -97,7 +104,7 @@ def _digits13(word, i):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _kind_at(word, i):  # type: ignore[no-untyped-def]
+def _kind_at(word: IdArray, i: int) -> int:
     """Row of `KINDS` whose name stands at i, a tab behind it; -1 for any other."""
     head = word[i]
     kind = -1
@@ -118,7 +125,7 @@ def _kind_at(word, i):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _decimal(buf, i):  # type: ignore[no-untyped-def]
+def _decimal(buf: Bytes, i: int) -> tuple[float, int]:
     """Number at i and the place behind it; place -1 where it is not plain or not exact in one operation."""
     negative = buf[i] == _MINUS
     if negative:
@@ -148,7 +155,7 @@ def _decimal(buf, i):  # type: ignore[no-untyped-def]
         first = i
         exponent = 0
         while _ZERO <= buf[i] <= _NINE and i - first < 4:
-            exponent = exponent * 10 + np.int64(buf[i] - _ZERO)
+            exponent = exponent * 10 + int(buf[i] - _ZERO)
             i += 1
         if i == first:
             return 0.0, -1
@@ -161,7 +168,7 @@ def _decimal(buf, i):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _address(buf, i):  # type: ignore[no-untyped-def]
+def _address(buf: Bytes, i: int) -> Any:
     """48-bit hardware address ``hh:hh:hh:hh:hh:hh`` at i; the top bit set where there is none."""
     value, bad = _U(0), False
     for k in range(6):
@@ -172,7 +179,7 @@ def _address(buf, i):  # type: ignore[no-untyped-def]
 
 
 @inline_kernel
-def _field_start(buf, stop):  # type: ignore[no-untyped-def]
+def _field_start(buf: Bytes, stop: int) -> int:
     """Start of the field that ends before ``stop``."""
     i = stop
     while buf[i - 1] != _TAB:
@@ -181,7 +188,7 @@ def _field_start(buf, stop):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _motion(buf, i, out):  # type: ignore[no-untyped-def]
+def _motion(buf: Bytes, i: int, out: Array) -> int:
     """Three numbers and an accuracy from i; the place of the line end, -1 where the line is otherwise."""
     for k in range(3):
         value, i = _decimal(buf, i)
@@ -197,8 +204,8 @@ def _motion(buf, i, out):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _radio(buf, word, kind, stop, n_tabs, out):  # type: ignore[no-untyped-def]
-    """Fields of a radio record from its line end backwards: place of the identifier, -1 where one is amiss."""
+def _radio(buf: Bytes, word: IdArray, kind: int, stop: int, n_tabs: int, out: Array) -> tuple[int, int]:
+    """Fields of a radio record from its end backwards: place of the identifier, -1 where one is amiss."""
     if kind == _WIFI:
         if n_tabs != 6 or buf[stop - 14] != _TAB:
             return -1, -1
@@ -234,13 +241,24 @@ def _radio(buf, word, kind, stop, n_tabs, out):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def scan_ms_indoor(buf, word, n, line, t, values, ids, token, care, counts):  # type: ignore[no-untyped-def]
+def scan_ms_indoor(
+    buf: Bytes,
+    word: IdArray,
+    n: int,
+    line: IntArray,
+    t: Array,
+    values: Array,
+    ids: IdArray,
+    token: IntArray,
+    care: IntArray,
+    counts: IntArray,
+) -> int:
     """Scan the whole lines in the first n bytes of ``buf``; at least 64 zeros follow them.
 
-    word : the overlapping view of ``buf``. line, t, ids : (7, m) out, line number from 1, s, identifier (0 where
-    ``token`` holds its place). values : (7, m, 3) out. token : (m, 4) out, kind, row, start, stop of an identifier
-    that is no address. care : (k, 3) out, line, start, stop of lines for the careful path. counts : (13,) in zeros,
-    out records per kind, tokens, care lines. Returns the number of lines.
+    word : the overlapping view of ``buf``. line, t, ids : (7, m) out, line number from 1, s, identifier (0
+    where ``token`` holds its place). values : (7, m, 3) out. token : (m, 4) out, kind, row, start, stop of an
+    identifier that is no address. care : (k, 3) out, line, start, stop of lines for the careful path. counts
+    : (13,) in zeros, out records per kind, tokens, care lines. Returns the number of lines.
     """
     i, number, n_token, n_care = 0, 0, 0, 0
     stamp_a, stamp_b, ms = _U(0), _U(0), np.int64(-1)
@@ -299,14 +317,16 @@ def scan_ms_indoor(buf, word, n, line, t, values, ids, token, care, counts):  # 
 
 
 @kernel
-def mark_repeats(t, ids, values, table, repeat):  # type: ignore[no-untyped-def]
+def mark_repeats(t: Array, ids: IdArray, values: Array, table: IntArray, repeat: BoolArray) -> None:
     """Mark the readings that repeat an earlier one exactly (time, identifier, three values; NaN equals NaN).
 
     table : (2^k,) int64 of -1, at least twice as long as the readings. repeat : (n,) bool out.
     """
     mask = np.uint64(table.size - 1)
     for i in range(t.size):
-        key = ids[i] * np.uint64(0x9E3779B97F4A7C15) + np.uint64(np.int64(t[i] * 1e3)) * np.uint64(0xC2B2AE3D27D4EB4F)
+        key = ids[i] * np.uint64(0x9E3779B97F4A7C15) + np.uint64(np.int64(t[i] * 1e3)) * np.uint64(
+            0xC2B2AE3D27D4EB4F
+        )
         slot = (key ^ (key >> np.uint64(29))) & mask
         repeat[i] = False
         while table[slot] >= 0:

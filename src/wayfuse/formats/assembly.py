@@ -1,7 +1,7 @@
 """From the columns of a file, in file order, to a `Recording`: ranges, clock, order, repeats, scans.
 
-Every reader yields `Piece` objects, bounded parts of its file with the line number of each record. `assemble` joins
-them and applies the rules that are the same for all formats, each with a counter in the `ReadReport`:
+Every reader yields `Piece` objects, bounded parts of its file with the line number of each record. `assemble`
+joins them and applies the rules that are the same for all formats, each with a counter in the `ReadReport`:
 
 * values that are not finite or outside what the sensor can say are dropped;
 * the clock is mended (`wayfuse.formats.clock`): lone outliers dropped, a sustained jump back continued;
@@ -18,7 +18,7 @@ import numpy as np
 from wayfuse.core.types import BoolArray
 from wayfuse.formats._kernels import mark_repeats
 from wayfuse.formats.clock import mend_clock
-from wayfuse.formats.columns import WIDTHS, Column, LineArray, Piece, count_lines
+from wayfuse.formats.columns import Column, Piece, count_lines
 from wayfuse.sensors.quality import ReadReport
 from wayfuse.sensors.recording import Device, Recording, Series
 from wayfuse.sensors.records import BleReading, Waypoint, WifiScan
@@ -56,9 +56,9 @@ def assemble(
 ) -> Recording:
     """Join the pieces of a file into a recording and count in ``report`` what was dropped or mended.
 
-    ``one_stream`` says that the line numbers order all records of the recording (one file), so that a jump of the
-    clock holds for all kinds; otherwise each kind is judged by itself. ``foreign_last_seen`` says that the readings
-    were stamped by another clock, which is then shifted onto the recording's.
+    ``one_stream`` says that the line numbers order all records of the recording (one file), so that a jump of
+    the clock holds for all kinds; otherwise each kind is judged by itself. ``foreign_last_seen`` says that
+    the readings were stamped by another clock, which is then shifted onto the recording's.
     """
     columns, waypoints = _join(pieces)
     columns = {kind: _in_range(kind, column, report) for kind, column in columns.items()}
@@ -106,7 +106,7 @@ def _join(pieces: Iterable[Piece]) -> tuple[dict[str, Column], list[tuple[int, W
 
 
 def _in_range(kind: str, column: Column, report: ReadReport) -> Column:
-    """Drop records whose values are not finite or outside the sensor's range; unknown frequencies become 0."""
+    """Drop records whose values are not finite or out of range; unknown frequencies become 0."""
     k, low, high = _RANGES[kind]
     label = kind.replace("_", " ")
     if len(column.t) and not (column.t.min() >= 0.0 and column.t.max() <= _LATEST_S):
@@ -114,10 +114,9 @@ def _in_range(kind: str, column: Column, report: ReadReport) -> Column:
         count_lines(report, f"{label}: time not finite or out of range", column.line[~timed])
         column = column.take(timed)
     values = column.values[:, :k]
-    inside: BoolArray | None = None
     if len(values) and not (values.min() >= low and values.max() <= high):  # NaN fails both
-        finite = np.isfinite(values).all(axis=1)
-        inside = finite & ((values >= low) & (values <= high)).all(axis=1)
+        finite: BoolArray = np.all(np.isfinite(values), axis=1)
+        inside: BoolArray = finite & ((values >= low) & (values <= high)).all(axis=1)
         count_lines(report, f"{label}: not finite", column.line[~finite])
         count_lines(report, f"{label}: out of range", column.line[finite & ~inside])
         column = column.take(inside)
@@ -187,8 +186,9 @@ def _scans(column: Column) -> tuple[WifiScan, ...]:
 def _on_own_clock(column: Column, report: ReadReport) -> Column:
     """Shift ``last_seen`` from the clock of the radio onto that of the recording.
 
-    One shift serves the whole file, so that repeats of a reading keep one time: the freshest reading of the promptest
-    scan was seen when that scan was delivered. Where the two clocks always agree the time was not recorded.
+    One shift serves the whole file, so that repeats of a reading keep one time: the freshest reading of the
+    promptest scan was seen when that scan was delivered. Where the two clocks always agree the time was not
+    recorded.
     """
     if not len(column.t):
         return column

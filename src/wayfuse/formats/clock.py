@@ -1,10 +1,10 @@
 """The clock of a file: lone outliers are dropped, a sustained jump back continues one sample later.
 
 Phones set their clock while they record, and single lines carry a foreign time. Within one sensor a record is
-*behind* when it lies more than a second before the latest time reached. If the next 20 records stay behind, the clock
-was set back: an offset lets time continue; if fewer do, they are outliers. Likewise the few records that ran ahead
-before the time fell back are the outliers, not the many after them. (Between sensors seconds of disorder are normal:
-radio events are delivered late, a waypoint is stated after it was passed.)
+*behind* when it lies more than a second before the latest time reached. If the next 20 records stay behind,
+the clock was set back: an offset lets time continue; if fewer do, they are outliers. Likewise the few records
+that ran ahead before the time fell back are the outliers, not the many after them. (Between sensors seconds
+of disorder are normal: radio events are delivered late, a waypoint is stated after it was passed.)
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from wayfuse.core.types import Array, BoolArray
-from wayfuse.formats.columns import Column, count_lines
+from wayfuse.formats.columns import Column, LineArray, count_lines
 from wayfuse.sensors.quality import ReadReport
 from wayfuse.sensors.records import Waypoint
 
@@ -40,7 +40,7 @@ class _Mended(NamedTuple):
 def mend_clock(
     columns: Mapping[str, Column], waypoints: Waypoints, report: ReadReport, *, one_stream: bool
 ) -> tuple[dict[str, Column], Waypoints]:
-    """Columns and waypoints on one clock that runs forward; every record dropped and every jump is counted."""
+    """Columns and waypoints on one clock that runs forward; what is dropped or shifted is counted."""
     out = dict(columns)
     if one_stream and out:
         main = max(out, key=lambda kind: (_is_series(kind), len(out[kind].t)))
@@ -80,7 +80,8 @@ def _mend(t: Array) -> _Mended | None:
 def _walk(t: list[float], sample: float) -> _Mended:
     """Judge the times one by one; only files with a fault come here.
 
-    Equal times in a row (the readings of a scan) count once, so that one scan with a foreign time is one outlier.
+    Equal times in a row (the readings of a scan) count once, so that one scan with a foreign time is one
+    outlier.
     """
     n = len(t)
     kept, offset = np.ones(n, np.bool_), np.zeros(n)
@@ -156,8 +157,8 @@ def _shifted(column: Column, offset: Array, kind: str) -> Column:
 class _Follow:
     """Gives the records of the other kinds the offset of the reference sensor, by line and by fit.
 
-    Near a jump a record that was delivered late still carries the old clock: of the offsets the one is taken that
-    brings it nearest to the reference's time at its line.
+    Near a jump a record that was delivered late still carries the old clock: of the offsets the one is taken
+    that brings it nearest to the reference's time at its line.
     """
 
     def __init__(self, reference: Column, mended: _Mended) -> None:
@@ -175,7 +176,7 @@ class _Follow:
         offset = self._offset(line, np.array([w.t for _, w in waypoints]))
         return [(n, w._replace(t=w.t + float(d))) for (n, w), d in zip(waypoints, offset, strict=True)]
 
-    def _offset(self, line: Array | np.ndarray, t: Array) -> Array:  # type: ignore[type-arg]
+    def _offset(self, line: LineArray, t: Array) -> Array:
         due = np.interp(line, self._line, self._t)
         fit = np.abs(t[:, None] + self._offsets - due[:, None])
         return np.asarray(self._offsets[np.argmin(fit, axis=1)])

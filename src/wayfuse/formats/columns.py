@@ -25,6 +25,8 @@ WIDTHS: Mapping[str, int] = {
     "wifi": 3,  # rssi (dBm), frequency (MHz, 0 unknown), last seen (s, NaN unknown)
     "ble": 2,  # rssi (dBm), tx power (dBm, NaN unknown)
     "beacon": 2,  # as ble, from a second record of the same advertisements
+    "linear": 3,  # acceleration without gravity, m/s², and
+    "gravity": 3,  # gravity apart, until a reader joins them
 }
 
 LineArray = NDArray[np.int64]
@@ -59,7 +61,7 @@ class Column(NamedTuple):
 
 @dataclass(slots=True)
 class Piece:
-    """A part of a file: columns by kind (`WIDTHS`), waypoints with their lines, and header fields met in it."""
+    """A part of a file: columns by kind (`WIDTHS`), waypoints with their lines, header fields met in it."""
 
     columns: dict[str, Column] = field(default_factory=dict)
     waypoints: list[tuple[int, Waypoint]] = field(default_factory=list)
@@ -73,7 +75,9 @@ class Rows:
         self._rows: dict[str, tuple[list[int], list[float], list[tuple[float, ...]], list[int]]] = {}
         self.waypoints: list[tuple[int, Waypoint]] = []
 
-    def add(self, kind: str, line: int, t: float, values: tuple[float, ...], identifier: int | None = None) -> None:
+    def add(
+        self, kind: str, line: int, t: float, values: tuple[float, ...], identifier: int | None = None
+    ) -> None:
         """Append one record."""
         rows = self._rows.get(kind)
         if rows is None:
@@ -98,10 +102,11 @@ class Rows:
 
 
 def quaternions(xyz: Array) -> Array:
-    """(n, 4) unit quaternions (w, x, y, z), w >= 0, of rotation vectors (n, 3) that hold their last three parts.
+    """(n, 4) unit quaternions (w, x, y, z), w >= 0, of rotation vectors (n, 3) that hold their last three
+    parts.
 
-    A vector longer than 1 by rounding gets w = 0; one that is no part of a unit quaternion keeps its length, so that
-    the norm shows it.
+    A vector longer than 1 by rounding gets w = 0; one that is no part of a unit quaternion keeps its length,
+    so that the norm shows it.
     """
     x, y, z = xyz[:, 0], xyz[:, 1], xyz[:, 2]
     out = np.empty((len(xyz), 4))

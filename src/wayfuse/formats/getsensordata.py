@@ -1,10 +1,11 @@
 """Reader of GetSensorData logs (LOPSI; the logs of the IPIN competitions).
 
-One record per line, four letters and fields between ``;``, ``%`` lines are comments. ``AppTimestamp`` (s since the
-start of the recording) is common to all sensors and becomes ``t``; ``SensorTimestamp`` is a sensor's own clock and
-serves only for the time a Wi-Fi access point was last seen. ``WIFI`` has the frequency or not, and its SSID may hold
-``;``, so it is split from both ends. ``AHRS`` holds the last three parts of the rotation vector: device to
-east-north-up (its ``YawZ`` is the right-handed turn about up, minus the azimuth that Android's own API gives).
+One record per line, four letters and fields between ``;``, ``%`` lines are comments. ``AppTimestamp`` (s
+since the start of the recording) is common to all sensors and becomes ``t``; ``SensorTimestamp`` is a
+sensor's own clock and serves only for the time a Wi-Fi access point was last seen. ``WIFI`` has the frequency
+or not, and its SSID may hold ``;``, so it is split from both ends. ``AHRS`` holds the last three parts of the
+rotation vector: device to east-north-up (its ``YawZ`` is the right-handed turn about up, minus the azimuth
+that Android's own API gives).
 
 References
 ----------
@@ -57,7 +58,11 @@ def read(path: str | Path) -> Recording:
     for piece in pieces:
         header |= piece.header
     if not header and not report.n_records:
-        what = "the file is empty" if path.stat().st_size == 0 else "neither a header nor a record of GetSensorData"
+        what = (
+            "the file is empty"
+            if path.stat().st_size == 0
+            else "neither a header nor a record of GetSensorData"
+        )
         raise FormatError(what, where=path, remedy="give --format, or leave the file out")
     release = header.get("release", "")
     return assemble(
@@ -65,7 +70,9 @@ def read(path: str | Path) -> Recording:
         report,
         name=path.stem,
         clock="AppTimestamp",
-        device=Device(header.get("brand", ""), header.get("model", ""), f"Android {release}" if release else ""),
+        device=Device(
+            header.get("brand", ""), header.get("model", ""), f"Android {release}" if release else ""
+        ),
         foreign_last_seen=True,
     )
 
@@ -73,7 +80,7 @@ def read(path: str | Path) -> Recording:
 def blocks(
     path: str | Path, block_bytes: int = BLOCK_BYTES, *, report: ReadReport | None = None
 ) -> Iterator[Piece]:
-    """Pieces of a log in file order, about ``block_bytes`` at a time; last seen times are still the sensor's."""
+    """Pieces of a log in file order, about ``block_bytes`` at a time; last seen is still the sensor's."""
     report = ReadReport(path=str(path)) if report is None else report
     with Path(path).open("rb") as file:
         while lines := file.readlines(block_bytes):
@@ -104,7 +111,11 @@ class _Lines:
         if fault:
             starts = [m.start() for m in _START.finditer(text)]
             if len(starts) > 1 or (starts and starts[0] > 0):
-                what = "two records on a line, both read" if len(starts) > 1 else "unreadable text before a record"
+                what = (
+                    "two records on a line, both read"
+                    if len(starts) > 1
+                    else "unreadable text before a record"
+                )
                 self._report.add(what, number)
                 parts = [text[i:j] for i, j in zip(starts, [*starts[1:], len(text)], strict=True)]
                 faults = [f for part in parts if (f := self._record(part, number))]
@@ -196,9 +207,13 @@ class _Lines:
         if not all(map(is_number, f[3:6])):
             return "POSI: not a number where one is due"
         lat, lon, floor = map(float, f[3:6])
-        if not (math.isfinite(float(f[1])) and abs(lat) <= 90.0 and abs(lon) <= 180.0 and floor == round(floor)):
+        if not (
+            math.isfinite(float(f[1])) and abs(lat) <= 90.0 and abs(lon) <= 180.0 and floor == round(floor)
+        ):
             return "POSI: out of range"
         if lat == 0.0 and lon == 0.0:
             return "POSI: no place given (0;0)"
-        self.rows.waypoints.append((number, Waypoint(float(f[1]), math.nan, math.nan, str(int(floor)), lat, lon)))
+        self.rows.waypoints.append(
+            (number, Waypoint(float(f[1]), math.nan, math.nan, str(int(floor)), lat, lon))
+        )
         return ""

@@ -1,16 +1,17 @@
 """Reader of the ms-indoor text logs (Indoor Location Competition 2.0, both public editions).
 
-One record per line: Unix time in ms, a tab, ``TYPE_...``, tab-separated fields; ``#`` lines are the header. Two
-records may share a line where a line end is missing; an SSID may hold anything, tabs too. The larger edition has
-digests in place of BSSIDs. A compiled scanner reads the lines that are as they should be, `_Careful` all others;
-together they equal the plain loop exactly.
+One record per line: Unix time in ms, a tab, ``TYPE_...``, tab-separated fields; ``#`` lines are the header.
+Two records may share a line where a line end is missing; an SSID may hold anything, tabs too. The larger
+edition has digests in place of BSSIDs. A compiled scanner reads the lines that are as they should be,
+`_Careful` all others; together they equal the plain loop exactly.
 
-``TYPE_BLUE`` is every Bluetooth advertisement; ``TYPE_BEACON`` and ``TYPE_BLU4`` repeat those that are iBeacons. A
-beacon heard as ``BLUE`` is therefore read once, with the tx power that ``BEACON`` adds.
+``TYPE_BLUE`` is every Bluetooth advertisement; ``TYPE_BEACON`` and ``TYPE_BLU4`` repeat those that are
+iBeacons. A beacon heard as ``BLUE`` is therefore read once, with the tx power that ``BEACON`` adds.
 
 References
 ----------
-.. [1] Indoor Location Competition 2.0 data set, github.com/location-competition/indoor-location-competition-20.
+.. [1] Indoor Location Competition 2.0 data set,
+github.com/location-competition/indoor-location-competition-20.
 """
 
 from __future__ import annotations
@@ -43,7 +44,17 @@ _FIRST_RADIO = 4  # index into _COLUMNS
 _COLUMNS = ("acceleration", "rotation_rate", "magnetic_field", "orientation", "wifi", "ble", "beacon")
 _FIELDS = {"WIFI": 7, "BLUE": 5, "BEACON": 9, "WAYPOINT": 4} | dict.fromkeys(KINDS[:4], 6)
 _IGNORED = {*KINDS[7:], "DIST1", "DIST2", "PRESSURE", "LIGHT", "PROXIMITY"}
-_HEADER = {"startTime", "endTime", "SiteID", "SiteName", "FloorId", "FloorName", "Brand", "Model", "AndroidName"}
+_HEADER = {
+    "startTime",
+    "endTime",
+    "SiteID",
+    "SiteName",
+    "FloorId",
+    "FloorName",
+    "Brand",
+    "Model",
+    "AndroidName",
+}
 _RECORD = re.compile(rb"\d{13}\tTYPE_[A-Z]")
 _WHOLE = re.compile(rb"\d+")
 
@@ -62,7 +73,9 @@ def read(path: str | Path) -> Recording:
     for piece in pieces:
         header |= piece.header
     if not header and not report.n_records:
-        what = "the file is empty" if path.stat().st_size == 0 else "neither a header nor a record of ms-indoor"
+        what = (
+            "the file is empty" if path.stat().st_size == 0 else "neither a header nor a record of ms-indoor"
+        )
         raise FormatError(what, where=path, remedy="give --format, or leave the file out")
     system = f"Android {header['AndroidName']}" if header.get("AndroidName") else ""
     return assemble(
@@ -115,14 +128,14 @@ class _Scanner:
         self._size = size
 
     def scan(self, buffer: bytearray, n: int) -> Piece:
-        """Records of the whole lines in the first n bytes: the scanner's, and those it left to the careful path."""
+        """Records of whole lines in the first n bytes: the scanner's, then the careful path's."""
         report = self._report
         if n > self._size:
             self._allocate(len(buffer))
         kept = bytes(buffer[n : n + _PADDING])
         buffer[n : n + _PADDING] = bytes(_PADDING)
         buf = np.frombuffer(buffer, np.uint8)
-        word = np.ndarray((n + _PADDING - 8,), "<u8", buf, strides=(1,))  # type: ignore[call-overload]
+        word = np.ndarray((n + _PADDING - 8,), "<u8", buf, strides=(1,))
         counts = np.zeros(13, np.int64)
         n_lines = scan_ms_indoor(
             buf, word, n, self._line, self._t, self._values, self._ids, self._token, self._care, counts
@@ -136,7 +149,9 @@ class _Scanner:
         for name, count in zip(KINDS, counts[:11].tolist(), strict=True):
             if count:
                 report.n_records[name] = report.n_records.get(name, 0) + count
-        columns = {kind: self._column(row, int(counts[row])) for row, kind in enumerate(_COLUMNS) if counts[row]}
+        columns = {
+            kind: self._column(row, int(counts[row])) for row, kind in enumerate(_COLUMNS) if counts[row]
+        }
         report.n_lines += int(n_lines)
         self._floor = careful.header.get("FloorName", "")
         return Piece(_merged(columns, careful.rows.columns()), careful.rows.waypoints, careful.header)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import re
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from wayfuse.core.errors import DataMissingError, FormatError, UsageError
@@ -12,6 +13,11 @@ __all__ = ["FORMATS", "expand", "read", "sniff"]
 
 FORMATS = ("ms-indoor", "getsensordata", "sensor-logger")
 _HEAD_BYTES = 1 << 16
+_MS_INDOOR = re.compile(rb"^\d{13}\tTYPE_[A-Z]", re.MULTILINE)
+_GETSENSORDATA = re.compile(
+    rb"^% LogFile created by the 'GetSensorData'|^(?:ACCE|GYRO|MAGN|PRES|AHRS|WIFI|BLE4|BLUE|POSI|GNSS);\d",
+    re.MULTILINE,
+)
 
 
 def read(path: str | Path, *, format: str | None = None, platform: str | None = None) -> Recording:  # noqa: A002
@@ -65,15 +71,22 @@ def sniff(path: str | Path) -> str:
 def expand(arguments: Sequence[str | Path]) -> list[Path]:
     """Paths of the recordings that arguments mean: a file, a folder (all recordings below it) or ``@FILE``.
 
-    ``@FILE`` lists a path per line, relative to the current folder; blank lines and lines with ``#`` are skipped.
-    Files of a folder that are no recordings are skipped; an argument that yields nothing is an error.
+    ``@FILE`` lists a path per line, relative to the current folder; blank lines and lines with ``#`` are
+    skipped. A Sensor Logger folder is itself a recording. Files of a folder that are no recordings are
+    skipped.
+
+    Raises
+    ------
+    DataMissingError : a path does not exist, or a folder or list holds no recording.
     """
     paths: list[Path] = []
     for argument in arguments:
         text = str(argument)
         if text.startswith("@"):
-            listed = [s.strip() for s in Path(text[1:]).read_text(encoding="utf-8").splitlines()]
-            paths += expand([s for s in listed if s and not s.startswith("#")])
+            listed = _listed(Path(text[1:]))
+            if not listed:
+                raise DataMissingError("no path in this list", where=text)
+            paths += expand(listed)
             continue
         path = Path(argument)
         if not path.exists():
@@ -81,18 +94,41 @@ def expand(arguments: Sequence[str | Path]) -> list[Path]:
         if path.is_file() or _sniff(path):
             paths.append(path)
             continue
-        found = sorted(p for p in path.rglob("*") if p.is_file() and _sniff(p))
+        found = sorted(_below(path))
         if not found:
             raise DataMissingError("no recording in this folder", where=path)
         paths += found
     return paths
 
 
+def _listed(path: Path) -> list[str]:
+    if not path.is_file():
+        raise DataMissingError(
+            "no such list of recordings", where=path, remedy="give @FILE with a path per line"
+        )
+    lines = (line.strip() for line in path.read_text(encoding="utf-8").splitlines())
+    return [line for line in lines if line and not line.startswith("#")]
+
+
+def _below(folder: Path) -> Iterator[Path]:
+    """Recordings in a folder and the folders below, hidden ones left out."""
+    for path in folder.iterdir():
+        if path.name.startswith("."):
+            continue
+        if path.is_dir() and not _sniff(path):
+            yield from _below(path)
+        elif path.is_dir() or _sniff(path):
+            yield path
+
+
 def _sniff(path: Path) -> str | None:
-    if path.is_dir():
-        return None
-    with path.open("rb") as file:
-        head = file.read(_HEAD_BYTES)
-    if head.startswith(b"#\tstartTime:") or b"\tTYPE_" in head[:4096]:
-        return "ms-indoor"
-    return None
+    if not path.is_dir():
+        with path.open("rb") as file:
+            head = file.read(_HEAD_BYTES)
+        if head.startswith(b"#\tstartTime:") or _MS_INDOOR.search(head):
+            return "ms-indoor"
+        if _GETSENSORDATA.search(head):
+            return "getsensordata"
+    from wayfuse.formats.sensor_logger_tables import is_recording
+
+    return "sensor-logger" if is_recording(path) else None
