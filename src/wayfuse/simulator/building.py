@@ -21,7 +21,7 @@ from wayfuse.simulator.geometry import clearance, crossings, inside, polygon_wal
 __all__ = ["Building", "Room", "Storey", "shopping_centre"]
 
 _WIDTH, _HEIGHT = 70.0, 45.0  # m
-_STOREY_HEIGHT = 5.0  # m, slab to slab: usual for shops
+_STOREY_HEIGHT = 4.5  # m, slab to slab: usual for shops; the layout does not state it
 _LON, _LAT = 11.0, 48.0  # degrees: a made-up place, far enough north to show a forgotten cos(latitude)
 _METRES_PER_DEGREE = float(np.deg2rad(6378137.0))  # on the sphere by which the public plans measure
 _NODE_SPACING = 8.0  # m, largest gap between way-points: the public recordings state one about every 7 m

@@ -128,7 +128,7 @@ def simulate_walk(
         magnetic_field=series["magnetic_field"],
         orientation=series["orientation"],
         wifi=tuple(_wifi(sweep, site.radios, start_ms) for sweep in sweeps),
-        waypoints=tuple(_stated(row, start_ms) for row in stated),
+        waypoints=tuple(_stated(row, storey.name, start_ms) for row in stated),
         site=site.building.name,
         floor=storey.name,
         clock="Unix time",
@@ -175,5 +175,5 @@ def _wifi(sweep: Sweep, radios: RadioField, start_ms: int) -> WifiScan:
     )
 
 
-def _stated(row: Array, start_ms: int) -> Waypoint:
-    return Waypoint(_clock(float(row[0]), start_ms), round(float(row[1]), 4), round(float(row[2]), 4), "")
+def _stated(row: Array, floor: str, start_ms: int) -> Waypoint:
+    return Waypoint(_clock(float(row[0]), start_ms), round(float(row[1]), 4), round(float(row[2]), 4), floor)
