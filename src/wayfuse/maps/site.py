@@ -57,10 +57,9 @@ class Unit(NamedTuple):
 class Floor:
     """One floor.
 
-    name : as the plan has it. level : as people count, F1 = 1, B1 = -1; floors are sorted by it. width,
-    height : m, the extent of the frame. elevation : m above F1 (nominal where the plan does not say).
-    outline : outer polygons with their holes. units : closed areas. walls : (w, 4) segments x0, y0, x1, y1
-    in m.
+    name : as the plan has it. level : as people count, F1 = 1, B1 = -1; floors are sorted by it.
+    width, height : m, extent of the frame. elevation : m above ground, nominal where the plan does not say.
+    outline : outer polygons with their holes. units : closed areas. walls : (w, 4) m: x0, y0, x1, y1.
     barriers : (b, 4) m, edges of the walkable space: walls set back by its widening, for neither plans nor
     people are exact (of 3064 straight legs between surveyed waypoints in a mall, 5.3 % cross a wall and 2.0 %
     a barrier).
@@ -152,15 +151,16 @@ class Site:
         return folded.index(name.casefold())
 
     def shift(self, source: int, target: int) -> Array:
-        """Offset (2,) m to add to a place of floor ``source`` for the place above or below on ``target``.
+        """Offset (2,) m to add to a place of floor ``source`` for its place in the frame of ``target``.
 
-        Zero where either floor has no anchor. Floors of one site share axes and scale, so a shift is enough
-        (the importer checks it).
+        Zero where either floor has no anchor. It is that of the middle of the source floor: frames of a site
+        share axes and, but for millimetres over a building, scale.
         """
         a, b = self.floors[source].anchor, self.floors[target].anchor
         if a is None or b is None or source == target:
             return np.zeros(2)
-        return b.to_xy(a.to_lonlat(np.zeros(2)))
+        middle = 0.5 * np.array([self.floors[source].width, self.floors[source].height])
+        return np.asarray(b.to_xy(a.to_lonlat(middle)) - middle)
 
     def save(self, folder: Path, *, overwrite: bool = False) -> None:
         """Write the site into a folder; see `wayfuse.maps.store`."""

@@ -16,8 +16,9 @@ import io
 import json
 import re
 import zipfile
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -29,6 +30,8 @@ from wayfuse.maps.walkable import Walkable
 from wayfuse.maps.walls import WallIndex
 
 __all__ = ["FORMAT", "VERSION", "check_target", "file_stems", "load_site", "save_site"]
+
+T = TypeVar("T")
 
 FORMAT = "wayfuse-site"
 VERSION = 1
@@ -100,7 +103,7 @@ def load_site(folder: Path) -> Site:
     try:
         floors = tuple(_floor(folder, entry) for entry in manifest["floors"])
         return Site(str(manifest["name"]), floors, dict(manifest.get("provenance", {})))
-    except (KeyError, TypeError, ValueError, IndexError, AttributeError) as error:
+    except (KeyError, TypeError, ValueError, AttributeError) as error:
         raise MapError(f"damaged: {error!r}", where=folder / MANIFEST, remedy=ANEW) from error
 
 
@@ -189,21 +192,15 @@ def _tables(floor: Floor) -> bytes:
 
 def _floor(folder: Path, entry: dict[str, Any]) -> Floor:
     files: dict[str, str] = entry["files"]
-    drawn_name = next(name for name in [*files, ""] if name.endswith((".geojson", "")))
-    derived_name = str(Path(drawn_name).with_suffix(".npz"))
-    drawn = _checked(folder, drawn_name, files[drawn_name])
-    derived = _checked(folder, derived_name, files[derived_name])
-    outline, units, segments = _parse_geojson(json.loads(drawn))
-    try:
-        with np.load(io.BytesIO(derived), allow_pickle=False) as tables:
-            x, y, cell = tables["mask_frame"].tolist()
-            walkable = Walkable((x, y), cell, tables["mask"])
-            walls, barriers = (
-                WallIndex.from_tables(segments[f"{name}s"], *(tables[f"{name}_{key}"] for key in WALL_TABLES))
-                for name in ("wall", "barrier")
-            )
-    except (OSError, EOFError, zipfile.BadZipFile) as error:
-        raise MapError(f"damaged: {error}", where=folder / derived_name, remedy=ANEW) from error
+    drawn = next(name for name in [*files, ".geojson"] if name.endswith(".geojson"))
+    derived = str(Path(drawn).with_suffix(".npz"))
+    outline, units, segments = _read(folder, drawn, files[drawn], _parse_geojson)
+    walkable, walls, barriers = _read(
+        folder,
+        derived,
+        files[derived],
+        lambda content: _parse_tables(content, segments["walls"], segments["barriers"]),
+    )
     anchor = entry["anchor"]
     return Floor(
         name=str(entry["name"]),
@@ -222,6 +219,27 @@ def _floor(folder: Path, entry: dict[str, Any]) -> Floor:
     )
 
 
+def _read(folder: Path, name: str, sha256: str, parse: Callable[[bytes], T]) -> T:
+    """Parse a file whose checksum is right; whatever is wrong with it is an error that names it."""
+    content = _checked(folder, name, sha256)
+    try:
+        return parse(content)
+    except (MapError, KeyError, TypeError, ValueError, IndexError, OSError, zipfile.BadZipFile) as error:
+        raise MapError(f"damaged: {error}", where=folder / name, remedy=ANEW) from error
+
+
+def _parse_tables(content: bytes, *segments: Array) -> tuple[Walkable, WallIndex, WallIndex]:
+    if not zipfile.is_zipfile(io.BytesIO(content)):
+        raise ValueError("not an archive of tables")
+    with np.load(io.BytesIO(content), allow_pickle=False) as tables:
+        x, y, cell = tables["mask_frame"].tolist()
+        walls, barriers = (
+            WallIndex.from_tables(lines, *(tables[f"{name}_{key}"] for key in WALL_TABLES))
+            for name, lines in zip(("wall", "barrier"), segments, strict=True)
+        )
+        return Walkable((x, y), cell, tables["mask"]), walls, barriers
+
+
 def _checked(folder: Path, name: str, sha256: str) -> bytes:
     if Path(name).name != name:
         raise MapError(f"names a file outside its folder: {name!r}", where=folder / MANIFEST, remedy=ANEW)
@@ -236,12 +254,12 @@ def _checked(folder: Path, name: str, sha256: str) -> bytes:
 
 
 def _parse_geojson(
-    collection: dict[str, Any],
+    content: bytes,
 ) -> tuple[tuple[Polygon, ...], tuple[Unit, ...], dict[str, Array]]:
     outline: tuple[Polygon, ...] = ()
     units: list[Unit] = []
     segments: dict[str, Array] = {}
-    for feature in collection["features"]:
+    for feature in json.loads(content)["features"]:
         properties, coordinates = feature["properties"], feature["geometry"]["coordinates"]
         match properties["kind"]:
             case "outline":

@@ -33,12 +33,13 @@ from numpy.typing import ArrayLike, NDArray
 from wayfuse.core.errors import MapError
 from wayfuse.core.types import Array, BoolArray
 
-__all__ = ["WallArrays", "WallIndex"]
+__all__ = ["LARGEST", "WallArrays", "WallIndex"]
 
 CLEARANCE_CELL = 0.25  # m
 LIST_CELL = 1.0  # m, a whole multiple of the clearance cell
 LONGEST_MOVE = 3.0  # m, more than any step; longer moves are exact too, but slow
 CLEARANCE_UNIT = 1.0 / 64.0  # m, resolution of the clearance field: 255 units are 4 m
+LARGEST = 3000.0  # m, a floor wider than this is a mistake (and its tables would not fit in memory)
 SAFETY = 1e-3  # m, taken off the clearance: rounding (1e-12 m) can never turn a miss into a skip
 
 
@@ -68,7 +69,7 @@ class WallIndex:
 
         Raises
         ------
-        MapError : the array has another shape, or holds numbers that are not finite.
+        MapError : the array has another shape, holds numbers that are not finite, or spans more than 3 km.
         """
         from wayfuse.maps._kernels import build_cells, fill_clearance
 
@@ -133,9 +134,11 @@ class WallIndex:
 
 
 def _in_order(walls: ArrayLike) -> Array:
-    segments = (
-        np.array(walls, dtype=np.float64, ndmin=2).reshape(-1, 4) if np.size(walls) else np.empty((0, 4))
-    )
+    segments = np.array(walls, dtype=np.float64)
+    if not segments.size:
+        return np.empty((0, 4))
+    if segments.ndim != 2 or segments.shape[1] != 4:
+        raise MapError(f"walls have shape {segments.shape}", remedy="give (w, 4): x0, y0, x1, y1")
     if not np.all(np.isfinite(segments)):
         raise MapError("walls: coordinates must be finite numbers", remedy="mend the plan")
     swap = (segments[:, 0] > segments[:, 2]) | (
@@ -154,4 +157,8 @@ def _extent(walls: Array) -> tuple[tuple[float, float], int, int]:
         np.floor(np.minimum(walls[:, 1], walls[:, 3]).min() - margin),
     )
     x1, y1 = walls[:, 2].max() + margin, np.maximum(walls[:, 1], walls[:, 3]).max() + margin
+    if max(x1 - x0, y1 - y0) > LARGEST:
+        raise MapError(
+            f"walls span {max(x1 - x0, y1 - y0):.0f} m, more than {LARGEST:.0f} m", remedy="mend the plan"
+        )
     return (float(x0), float(y0)), int(np.ceil((x1 - x0) / LIST_CELL)), int(np.ceil((y1 - y0) / LIST_CELL))

@@ -28,12 +28,13 @@ from wayfuse.maps.build import build_floor, nominal_elevation
 from wayfuse.maps.geometry import clean_polygons
 from wayfuse.maps.levels import parse_level, sort_key
 from wayfuse.maps.site import Floor, Polygon, Site, Unit
+from wayfuse.maps.walls import LARGEST
 
 __all__ = ["FloorReport", "ImportReport", "import_site"]
 
 SPHERE_RADIUS = 6378137.0  # m, of Web-Mercator
 RESIDUAL_LIMIT = 1.0  # m, a larger disagreement of picture and outline is reported
-OUTLINE_MARGIN = 5.0  # m a unit may reach over the outline's box before it is reported
+OUTLINE_MARGIN = 20.0  # m a unit may reach over the outline's box; beyond, its coordinates are wrong
 
 # Categories are opaque ids; these are read off the names of the units that carry them. The last wins.
 CATEGORIES = {
@@ -195,9 +196,9 @@ def _size(path: Path) -> tuple[float, float]:
         raise MapError(
             "has no map_info.width and map_info.height", where=path, remedy="metres, as numbers"
         ) from error
-    if not (0.0 < width < 1e5 and 0.0 < height < 1e5):
+    if not (0.0 < width < LARGEST and 0.0 < height < LARGEST):
         raise MapError(
-            f"size {width} x {height} m is impossible", where=path, remedy="metres between 0 and 100000"
+            f"size {width} x {height} m is impossible", where=path, remedy=f"metres, up to {LARGEST:.0f}"
         )
     return width, height
 
@@ -247,7 +248,8 @@ def _units(feature: Any, number: int, frame: _Frame, notes: _Notes) -> list[Unit
             if np.any(low < -OUTLINE_MARGIN) or np.any(
                 high > np.add((frame.width, frame.height), OUTLINE_MARGIN)
             ):
-                notes.add(f"unit {ident}: reaches over the outline")
+                notes.add(f"unit {ident}: lies off the floor, left out")
+                continue
             units.append(
                 Unit(ident, html.unescape(str(properties.get("name") or "")), _category(properties), polygon)
             )
