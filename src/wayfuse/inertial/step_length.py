@@ -41,7 +41,16 @@ import numpy as np
 from wayfuse.core.errors import ConfigError, UsageError
 from wayfuse.core.types import Array
 
-__all__ = ["DEFAULT", "DEFAULTS", "MODELS", "StepFeatures", "StepLengthModel", "design", "fit"]
+__all__ = [
+    "DEFAULT",
+    "DEFAULTS",
+    "MODELS",
+    "StepFeatures",
+    "StepLengthModel",
+    "coefficient_count",
+    "design",
+    "fit",
+]
 
 MODELS = ("constant", "weinberg", "kim", "kakiuchi", "regression")
 _HUBER = 0.15  # relative error of a segment beyond which its weight falls: 1.5 to 2 times the median error
@@ -76,7 +85,7 @@ class StepLengthModel:
     def __post_init__(self) -> None:
         if self.name not in MODELS:
             raise ConfigError(f"no step-length model {self.name!r}", remedy=f"one of {', '.join(MODELS)}")
-        n = 6 if self.name == "regression" else 1
+        n = coefficient_count(self.name)
         if len(self.coefficients) != n or not np.all(np.isfinite(self.coefficients)):
             raise ConfigError(f"the {self.name} model takes {n} finite coefficients, got {self.coefficients}")
         if not 0.0 < self.bounds[0] < self.bounds[1]:
@@ -91,6 +100,11 @@ class StepLengthModel:
         """Lengths of steps (m), (n,)."""
         length = design(self.name, features) @ np.asarray(self.coefficients)
         return np.asarray(np.clip(length, *self.bounds))
+
+
+def coefficient_count(name: str) -> int:
+    """Number of coefficients of a model."""
+    return 6 if name == "regression" else 1
 
 
 def design(name: str, features: StepFeatures) -> Array:
