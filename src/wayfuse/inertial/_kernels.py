@@ -323,7 +323,7 @@ def step_length_of(p: Array, event: Array) -> float:
         length = p[o] * np.sqrt(np.sqrt(event[at.E_VERTICAL]))
     else:  # regression
         length = p[o] + p[o + 1] / event[at.E_DURATION] + p[o + 2] * np.cbrt(mean_abs)
-        length += p[o + 3] * mean_abs + p[o + 4] * peak - p[o + 5] * valley
+        length += (p[o + 3] * peak + p[o + 4] * mean_abs) / (peak - valley)
     return float(min(max(length, p[o + 6]), p[o + 7]))
 
 

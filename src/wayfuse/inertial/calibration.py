@@ -78,11 +78,10 @@ def straight_segments(
             row = _segment(events, columns, one, two)
             if row:
                 rows.append((*row, float(walk)))
-    if not rows:
-        nothing = np.empty(0)
-        return Segments(np.empty((0, coefficient_count(name))), *[nothing] * 5, np.empty(0, dtype=np.int64))
-    table = np.array(rows)
-    return Segments(table[:, :-6], *table[:, -6:-1].T, table[:, -1].astype(np.int64))
+    k = coefficient_count(name)
+    table = np.array(rows, dtype=np.float64).reshape(-1, k + 6)
+    distance, steps, duration, heading, direction, walk_of = table[:, k:].T
+    return Segments(table[:, :k], distance, steps, duration, heading, direction, walk_of.astype(np.int64))
 
 
 def _segment(events: StepEvents, columns: Array, one: Waypoint, two: Waypoint) -> tuple[float, ...]:
