@@ -30,12 +30,16 @@ class ScannerModel:
     latency_s: float = 0.6  # s from the last channel to the list; measured age of the freshest tenth 0.73 s
     memory_s: float = 30.0  # s a network stays listed; measured 99 % younger than 29 s
     before_s: float = 30.0  # s of sweeps before the recording, at its first place
-    sensitivity_dbm: float = -89.0  # measured weakest readings -93 to -90 dBm
+    sensitivity_dbm: float = -89.0  # where half of the strong networks' hits are left; measured 5 % below -90
+    weakest_dbm: float = -93.0  # nothing weaker is reported; measured
     softness_db: float = 1.5  # logistic edge of the sensitivity
-    hit_rate: float = 0.8  # chance that a strong network is heard in a sweep
-    fading_db: float = 2.5  # per sweep and radio: people, doors, the hand
+    hit_rate: float = (
+        0.55  # chance that a strong network is heard in a sweep; gives the measured share of stale
+    )
+    fading_db: float = 5.0  # per sweep and radio: multipath; a Rayleigh channel has 5.6 dB
+    walk_db: float = 4.0  # per walk and radio: crowds, doors, the hour; another day than the survey's
     twin_db: float = 0.7  # per reading: networks of one radio
-    body_db: float = 4.0  # behind the walker's back
+    body_db: float = 7.0  # behind the walker's back
     device_offset_db: float = 0.0  # of this phone's receiver
 
 
@@ -59,11 +63,13 @@ def scan(
     heard_at = delivered[:, None] - model.latency_s - model.sweep_s * (1.0 - order)  # (sweeps, radios)
     level = _levels(walk, floor, radios, heard_at, model)
     level += rng.normal(0.0, model.fading_db, (n_sweeps, n_radios)) + model.device_offset_db
+    level += rng.normal(0.0, model.walk_db, n_radios)
 
     n = len(radios.bssid)
     rssi = np.round(level[:, radios.radio] + rng.normal(0.0, model.twin_db, (n_sweeps, n)))
     edge = (rssi - model.sensitivity_dbm) / model.softness_db
     heard = rng.random((n_sweeps, n)) < model.hit_rate / (1.0 + np.exp(-edge))
+    heard &= rssi >= model.weakest_dbm
     times = heard_at[:, radios.radio]
 
     last_seen, last_rssi = np.full(n, -np.inf), np.zeros(n)
