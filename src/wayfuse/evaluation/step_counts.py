@@ -52,11 +52,13 @@ class StepCountTable:
 
     def describe(self) -> list[str]:
         """Lines of a table: walks, then means per position and over all."""
-        lines = [f"{'walk':12s}{'position':12s}{'steps':>6s}{'found':>6s}{'error':>8s}"]
-        for c in sorted(self.counts, key=lambda c: (c.position, c.user)):
-            lines.append(f"{c.user:12s}{c.position:12s}{c.steps:6d}{c.found:6d}{100 * c.error:+7.1f}%")
-        lines += [f"{'mean':12s}{p:12s}{'':12s}{100 * self.mean_error(p):7.1f}%" for p in self.positions]
-        return [*lines, f"{'mean':12s}{'all':12s}{'':12s}{100 * self.mean_error():7.1f}%"]
+        ordered = sorted(self.counts, key=lambda c: (c.position, c.user))
+        return [
+            f"{'walk':12s}{'position':12s}{'steps':>6s}{'found':>6s}{'error':>8s}",
+            *(f"{c.user:12s}{c.position:12s}{c.steps:6d}{c.found:6d}{100 * c.error:+7.1f}%" for c in ordered),
+            *(f"{'mean':12s}{p:12s}{'':12s}{100 * self.mean_error(p):7.1f}%" for p in self.positions),
+            f"{'mean':12s}{'all':12s}{'':12s}{100 * self.mean_error():7.1f}%",
+        ]
 
 
 def score(root: str | Path, config: InertialConfig | None = None) -> StepCountTable:

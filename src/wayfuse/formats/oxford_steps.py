@@ -90,10 +90,8 @@ def validation_walks(folder: str | Path) -> tuple[CountedWalk, ...]:
     """
     paths = sorted(Path(folder).glob("**/validation/user*_*_*.csv"))
     if not paths:
-        raise DataMissingError(
-            "no validation/user*.csv below this folder", where=folder, remedy="fetch the data set
-            oxford-steps"
-        )
+        remedy = "fetch the data set oxford-steps"
+        raise DataMissingError("no validation/user*.csv below this folder", where=folder, remedy=remedy)
     return tuple(read(path) for path in paths)
 
 

@@ -8,12 +8,12 @@ With the band-passed norm of the acceleration :math:`a` (extremes :math:`a_{max}
 * ``weinberg``: :math:`l = k (a_{max} - a_{min})^{1/4}` [1]_
 * ``kim``: :math:`l = k\, \overline{|a|}^{1/3}` [2]_
 * ``kakiuchi``: :math:`l = k (a_{v,max} - a_{v,min})^{1/4}` [3]_, as in [4]_, Eq. 14
-* ``regression``: linear in 1, :math:`1/T`, :math:`\overline{|a|}^{1/3}`, :math:`a_{max} / (a_{max} - a_{min})`,
-  :math:`\overline{|a|} / (a_{max} - a_{min})`
+* ``regression``: linear in 1, :math:`1/T`, :math:`\overline{|a|}^{1/3}`, :math:`a_{max} / (a_{max} -
+  a_{min})`, :math:`\overline{|a|} / (a_{max} - a_{min})`
 
-Every model is linear in its coefficients and is fitted by robust least squares to walked distances. Fitted to the
-ms-indoor survey walks, the models err on segments of 7 m by (median / 90 %, in per cent; right: the same coefficients
-on the other people, phones and floors of ipin2023-track3, with the mean error):
+Every model is linear in its coefficients and is fitted by robust least squares to walked distances. Fitted
+to the ms-indoor survey walks, the models err on segments of 7 m by (median / 90 %, in per cent; right: the
+same coefficients on the other people, phones and floors of ipin2023-track3, with the mean error):
 
 ============ =========== ===================
 constant     11.6 / 29.4  9.0 / 21.6 (+9)
@@ -23,8 +23,8 @@ kakiuchi      9.6 / 26.2 16.4 / 26.1 (-17)
 regression    8.5 / 24.1  5.9 / 16.2 (-2)
 ============ =========== ===================
 
-A regression on strengths alone (mean, peak, valley) reaches 7.7 / 21.9 at home and errs by -35 % there: how strongly
-a phone is shaken tells the person and the phone, step rate and wave shape tell the step.
+A regression on strengths alone (mean, peak, valley) reaches 7.7 / 21.9 at home and errs by -35 % there: how
+strongly a phone is shaken tells the person and the phone, step rate and wave shape tell the step.
 
 >>> model = StepLengthModel("weinberg", (0.4,))
 >>> step = StepFeatures(*(np.array([v]) for v in (0.5, 3.0, -2.0, 1.5, 4.0)))
