@@ -53,24 +53,33 @@ def crosses_one(
 ) -> bool:
     """Whether a move crosses any wall, by clearance field and packed cell list; see `WallIndex.arrays`.
 
+    ``packed`` (m, 5) = the walls of each list cell, nearest first, and the square of their distance from it.
     ``grid`` = (origin x, origin y, 1 / clearance cell, metres per unit of clearance, 1 / list cell, longest
     move, list cells per row).
     """
     # float32 moves are widened first, so that they mean the same as in the definition
-    px, py, qx, qy = np.float64(x0), np.float64(y0), np.float64(x1), np.float64(y1)
-    dx, dy = qx - px, qy - py
+    sx, sy, ex, ey = np.float64(x0), np.float64(y0), np.float64(x1), np.float64(y1)
+    dx, dy = ex - sx, ey - sy
     length2 = dx * dx + dy * dy
     hit = False
     if length2 > grid[5] * grid[5]:
-        hit = brute_one(px, py, qx, qy, walls)
+        hit = brute_one(sx, sy, ex, ey, walls)
     else:
-        u, v = (px - grid[0]) * grid[2], (py - grid[1]) * grid[2]
+        u, v = (sx - grid[0]) * grid[2], (sy - grid[1]) * grid[2]
         # off the grid no wall is within the longest move; NaN fails every comparison and crosses nothing
         if u >= 0.0 and v >= 0.0 and u < clearance.shape[1] and v < clearance.shape[0]:
             free = clearance[int(v), int(u)] * grid[3]
             if not length2 < free * free:
-                cell = int((py - grid[1]) * grid[4]) * int(grid[6]) + int((px - grid[0]) * grid[4])
-                hit = brute_one(px, py, qx, qy, packed[start[cell] : start[cell + 1]])
+                swap = sx > ex or (sx == ex and sy > ey)
+                px, py = (ex, ey) if swap else (sx, sy)
+                qx, qy = (sx, sy) if swap else (ex, ey)
+                cell = int((sy - grid[1]) * grid[4]) * int(grid[6]) + int((sx - grid[0]) * grid[4])
+                for k in range(start[cell], start[cell + 1]):
+                    if packed[k, 4] > length2:
+                        break  # nearest first: the others are out of reach
+                    if cut(px, py, qx, qy, packed[k, 0], packed[k, 1], packed[k, 2], packed[k, 3]):
+                        hit = True
+                        break
     return hit
 
 
@@ -166,10 +175,12 @@ def build_cells(
     reach: float,
     start: NDArray[np.int32],
     index: NDArray[np.int32],
+    distance: Array,
 ) -> None:
     """List the walls within reach of each cell: with ``index`` empty, count into start[c + 1]; else fill it.
 
-    On filling, start[c] must be where cell c begins; it comes back as where it ends.
+    On filling, start[c] must be where cell c begins; it comes back as where it ends. ``distance`` takes the
+    distance (m) of each listed wall from its cell.
     """
     counting = len(index) == 0
     for k in range(walls.shape[0]):
@@ -182,12 +193,14 @@ def build_cells(
             y = origin_y + j * cell
             for i in range(i0, i1):
                 x = origin_x + i * cell
-                if _box_distance(x, y, x + cell, y + cell, ax, ay, bx, by) <= reach:
+                d = _box_distance(x, y, x + cell, y + cell, ax, ay, bx, by)
+                if d <= reach:
                     c = j * nx + i
                     if counting:
                         start[c + 1] += 1
                     else:
                         index[start[c]] = k
+                        distance[start[c]] = d
                         start[c] += 1
 
 

@@ -35,7 +35,7 @@ T = TypeVar("T")
 
 FORMAT = "wayfuse-site"
 VERSION = 1
-WALL_TABLES = ("clearance", "start", "index")  # of an index, as `WallIndex.tables` gives them
+WALL_TABLES = ("clearance", "start", "index", "distance")  # of an index, as `WallIndex.tables` gives them
 MANIFEST = "site.json"
 ANEW = "import the site anew with `wayfuse site import`"
 

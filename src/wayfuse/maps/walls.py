@@ -14,8 +14,8 @@ leave to that side.
 
 `WallIndex` answers without looking at every wall, and with the same answer for every move: (1) a *clearance
 field* of 0.25 m cells holds the distance that is free around the cell; a shorter move crosses nothing. (2) A
-*cell list* of 1 m cells holds copies of all walls within the longest move (3 m) of the cell. A move longer
-than that is tested against every wall.
+*cell list* of 1 m cells holds copies of all walls within the longest move (3 m) of the cell, nearest first: those
+farther away than the move is long are not looked at. A move of more than 3 m is tested against every wall.
 
 >>> index = WallIndex.build(np.array([[0.0, 1.0, 2.0, 1.0]]))
 >>> index.crosses([1.0, 3.0], [0.0, 0.0], [1.0, 3.0], [2.0, 2.0]).tolist()
@@ -57,11 +57,13 @@ class WallArrays(NamedTuple):
 class WallIndex:
     """Walls of a floor, ready to be asked.
 
-    arrays : for kernels (`wayfuse.maps._kernels.crosses_one`). index : walls of each list cell, as stored.
+    arrays : for kernels (`wayfuse.maps._kernels.crosses_one`). index, distance : walls of each list cell and
+    how far they are (units of 1/64 m), nearest first, as stored.
     """
 
     arrays: WallArrays
     index: NDArray[np.int32]
+    distance: NDArray[np.uint8]
 
     @classmethod
     def build(cls, walls: ArrayLike) -> WallIndex:
@@ -82,12 +84,16 @@ class WallIndex:
         clearance -= np.minimum(clearance, 1)  # one unit (> SAFETY) less
         reach = LONGEST_MOVE + SAFETY
         start = np.zeros(nx * ny + 1, np.int32)
-        build_cells(segments, origin[0], origin[1], LIST_CELL, nx, ny, reach, start, np.empty(0, np.int32))
+        frame = (origin[0], origin[1], LIST_CELL, nx, ny, reach)
+        build_cells(segments, *frame, start, np.empty(0, np.int32), np.empty(0))
         np.cumsum(start, out=start)
         index = np.empty(start[-1], np.int32)
+        distance = np.empty(len(index))
         if len(index):
-            build_cells(segments, origin[0], origin[1], LIST_CELL, nx, ny, reach, start[:-1].copy(), index)
-        return cls.from_tables(segments, clearance, start, index)
+            build_cells(segments, *frame, start[:-1].copy(), index, distance)
+        steps = np.maximum(np.floor(distance / CLEARANCE_UNIT) - 1, 0).astype(np.uint8)
+        order = np.lexsort((index, steps, np.repeat(np.arange(nx * ny), np.diff(start))))
+        return cls.from_tables(segments, clearance, start, index[order], steps[order])
 
     @classmethod
     def from_tables(
@@ -96,6 +102,7 @@ class WallIndex:
         clearance: NDArray[np.uint8],
         start: NDArray[np.int32],
         index: NDArray[np.int32],
+        distance: NDArray[np.uint8],
     ) -> WallIndex:
         """Index of walls and the tables that `build` made of them (stored with a site).
 
@@ -107,17 +114,20 @@ class WallIndex:
         origin, nx, ny = _extent(segments)
         k = round(LIST_CELL / CLEARANCE_CELL)
         fits = (
-            clearance.shape == (ny * k, nx * k) and start.shape == (nx * ny + 1,) and start[-1] == len(index)
+            clearance.shape == (ny * k, nx * k)
+            and start.shape == (nx * ny + 1,)
+            and start[-1] == len(index) == len(distance)
         )
         if not fits or (len(index) and not 0 <= index.min() <= index.max() < len(segments)):
             raise MapError("the wall tables do not belong to the walls", remedy="import the site anew")
         grid = np.array([*origin, 1 / CLEARANCE_CELL, CLEARANCE_UNIT, 1 / LIST_CELL, LONGEST_MOVE, nx])
-        return cls(WallArrays(grid, clearance, start, segments[index], segments), index)
+        packed = np.column_stack([segments[index], (distance * CLEARANCE_UNIT) ** 2])
+        return cls(WallArrays(grid, clearance, start, packed, segments), index, distance)
 
     @property
-    def tables(self) -> tuple[NDArray[np.uint8], NDArray[np.int32], NDArray[np.int32]]:
+    def tables(self) -> tuple[NDArray[np.uint8], NDArray[np.int32], NDArray[np.int32], NDArray[np.uint8]]:
         """What `from_tables` takes after the walls."""
-        return self.arrays.clearance, self.arrays.start, self.index
+        return self.arrays.clearance, self.arrays.start, self.index, self.distance
 
     def crosses(self, x0: ArrayLike, y0: ArrayLike, x1: ArrayLike, y1: ArrayLike) -> BoolArray:
         """Whether moves (x0, y0) -> (x1, y1), (n,) m each, cross a wall; NaN crosses nothing."""
