@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from wayfuse.core.types import Array
 from wayfuse.evaluation.errors import MethodScores, Scores, summarise
 from wayfuse.evaluation.estimates_file import WalkEstimates
-from wayfuse.evaluation.plots import INK, new_figure, style
+from wayfuse.evaluation.plots import INK, new_figure, shown, style
 from wayfuse.evaluation.truth import Truth
 
 if TYPE_CHECKING:
@@ -174,13 +174,13 @@ def _estimates(ax: Axes, scores: Scores, method: MethodScores, index: int, truth
     here = _true_floor(truth, track.t) == floor
     right = scores.frame.steps(track.floor, np.full(len(track), floor)) == 0
     right = right | (floor == "")
-    label = f"{method.name}: {_error_text(scores, method, truth.walk)}"
+    label = f"{shown(method.name)}: {_error_text(scores, method, truth.walk)}"
     over = _OVER + 4 - 0.1 * index  # the first method on top
     ax.plot(*_broken(xy, here & right).T, marker=".", markersize=4, zorder=over, label=label, **look)
     wrong = here & ~right
     if wrong.any():
         ax.plot(*xy[wrong].T, "x", color=look["color"], markersize=6, zorder=over,
-                label=f"{method.name}: on another floor")  # fmt: skip
+                label=f"{shown(method.name)}: on another floor")  # fmt: skip
     if method is _with_covariance(scores) and truth.plane is None:
         _ellipses(ax, track, xy, here, look["color"], method.name)
 
@@ -219,7 +219,7 @@ def _ellipses(ax: Axes, track: WalkEstimates, xy: Array, here: Any, colour: str,
             color=colour,
             markersize=9,
             markerfacecolor="none",
-            label=f"{name}: 95 % ellipses as stated",
+            label=f"{shown(name)}: 95 % ellipses as stated",
         )
 
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from itertools import pairwise
+from itertools import count, pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -31,6 +31,7 @@ __all__ = [
     "choose_walks",
     "error_by_time_figure",
     "new_figure",
+    "shown",
     "style",
     "write_plots",
 ]
@@ -45,7 +46,7 @@ _MIN_POINTS = 10  # per span of time; fewer make no figure
 
 def style(index: int) -> dict[str, Any]:
     """Colour and dash of the method with an index; the first seven differ in colour."""
-    dash = DASHES[(index // len(COLOURS) + index) % len(DASHES)]
+    dash = DASHES[(index % len(COLOURS) + index // len(COLOURS)) % len(DASHES)]
     return {"color": COLOURS[index % len(COLOURS)], "linestyle": dash, "linewidth": 1.9}
 
 
@@ -75,10 +76,16 @@ def _used(scores: Scores, missing: str) -> list[tuple[MethodScores, PointErrors]
     return [(m, m.points["1hz"].used(missing)) for m in scores.methods]
 
 
+def shown(name: str) -> str:
+    """Name of a method as the start of a label: one that begins with _ would be kept out of the legend."""
+    return f" {name}" if name.startswith("_") else name
+
+
 def _legend(ax: Axes, where: Literal["lower right", "upper right", "upper left"]) -> None:
-    for text in ax.legend(
-        loc=where, fontsize=8.5, frameon=True, framealpha=0.92, edgecolor=FAINT
-    ).get_texts():
+    if not ax.get_legend_handles_labels()[0]:
+        return
+    look: dict[str, Any] = {"fontsize": 8.5, "framealpha": 0.92, "edgecolor": FAINT}
+    for text in ax.legend(loc=where, **look).get_texts():
         text.set_parse_math(False)
 
 
@@ -93,7 +100,7 @@ def cdf_figure(scores: Scores, missing: str = "skip") -> Figure:
             continue
         error = np.sort(points.error)
         share = np.arange(1, len(error) + 1) / len(error)
-        label = f"{method.name}: mean {error.mean():.2f} m, median {np.median(error):.2f} m"
+        label = f"{shown(method.name)}: mean {error.mean():.2f} m, median {np.median(error):.2f} m"
         ax.plot(
             np.insert(error, 0, 0.0),
             100 * np.insert(share, 0, 0.0),
@@ -148,11 +155,17 @@ def error_by_time_figure(scores: Scores, missing: str = "skip") -> Figure:
     for k, (method, points) in enumerate(used):
         look = style(k)
         at, median = _binned(points, edges, lambda p: float(np.median(p.error)))
-        ax.plot(at, median, marker="o", markersize=4, label=f"{method.name}: median", **look)
+        ax.plot(at, median, marker="o", markersize=4, label=f"{shown(method.name)}: median", **look)
         at, mean = _binned(points, edges, lambda p: float(np.mean(p.error)))
         thin = look | {"linewidth": 1.0}
         ax.plot(
-            at, mean, marker="o", markersize=4, markerfacecolor="white", label=f"{method.name}: mean", **thin
+            at,
+            mean,
+            marker="o",
+            markersize=4,
+            markerfacecolor="white",
+            label=f"{shown(method.name)}: mean",
+            **thin,
         )
     ax.set_ylim(bottom=0.0)
     _axes(ax, "", "horizontal error (m)", "Error since the first Wi-Fi scan, at 1 Hz")
@@ -186,15 +199,17 @@ def calibration_figure(scores: Scores, missing: str = "skip") -> Figure | None:
     for k, method, points in stated:
         look = style(k)
         level = 100 * np.sort(nominal_level(points.error, points.r68, points.r95))
-        left.plot(level, 100 * np.arange(1, len(level) + 1) / len(level), label=method.name, **look)
+        left.plot(level, 100 * np.arange(1, len(level) + 1) / len(level), label=shown(method.name), **look)
         within = [100 * float(np.mean(points.error <= r)) for r in (points.r68, points.r95)]
         left.plot((68, 95), within, "o", color=look["color"], markeredgecolor="white", markersize=7, zorder=5)
         at, worst = _binned(points, edges, lambda p: float(np.percentile(p.error, 95)))
-        right.plot(at, worst, marker="o", markersize=4, label=f"{method.name}: 95 % of errors below", **look)
+        right.plot(
+            at, worst, marker="o", markersize=4, label=f"{shown(method.name)}: 95 % of errors below", **look
+        )
         at, radius = _binned(points, edges, lambda p: float(np.mean(p.r95)))
         thin = look | {"linewidth": 1.0}
         right.plot(at, radius, marker="D", markersize=4, markerfacecolor="white",
-                   label=f"{method.name}: mean r95 stated", **thin)  # fmt: skip
+                   label=f"{shown(method.name)}: mean r95 stated", **thin)  # fmt: skip
     left.set_xlim(0, 100)
     left.set_ylim(0, 100)
     left.set_aspect("equal")
@@ -268,11 +283,9 @@ def _file_stems(walks: Sequence[str]) -> Mapping[str, str]:
     stems: dict[str, str] = {}
     taken: set[str] = set()
     for walk in walks:
-        stem = re.sub(r"[^\w.-]+", "_", walk).lstrip(".") or "walk"
-        number = 2
-        while stem.casefold() in taken:
-            stem = f"{stem}-{number}"
-            number += 1
+        plain = re.sub(r"[^\w.-]+", "_", walk).lstrip(".") or "walk"
+        candidates = (f"{plain}-{k}" if k > 1 else plain for k in count(1))
+        stem = next(c for c in candidates if c.casefold() not in taken)
         taken.add(stem.casefold())
         stems[walk] = stem
     return stems

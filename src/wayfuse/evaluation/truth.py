@@ -166,8 +166,9 @@ def truth_of(recording: Recording, frame: CommonFrame | None = None) -> Truth | 
     kept = metres or degrees
     if not kept:
         return None
-    t, first = np.unique(np.array([w.t for w in kept], dtype=np.float64), return_index=True)
+    first = np.unique(np.round([w.t for w in kept], 6), return_index=True)[1]
     kept = [kept[i] for i in first]
+    t = np.array([w.t for w in kept], dtype=np.float64)
     floor = np.array([w.floor or recording.floor for w in kept], dtype=np.str_)
     xy, plane = _places(kept, floor, frame) if metres else _geo_places(kept, frame)
     radio = first_radio(recording)
