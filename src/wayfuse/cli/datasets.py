@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -166,8 +167,5 @@ def _megabytes(size: int) -> str:
 @contextmanager
 def _bar(total: int, label: str, *, hidden: bool) -> Iterator[Callable[[int], None]]:
     """Progress in bytes on standard error, unless machines read."""
-    if hidden:
-        yield lambda _: None
-        return
-    with click.progressbar(length=total, label=label, file=click.get_text_stream("stderr")) as bar:
+    with click.progressbar(length=total, label=label, file=sys.stderr, hidden=hidden) as bar:
         yield bar.update

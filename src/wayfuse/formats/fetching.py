@@ -33,7 +33,7 @@ Progress = Callable[[int], None]
 
 @dataclass(slots=True)
 class Outcome:
-    """What became of the files of a set: brought, already there, failed (with the reason), without address."""
+    """What became of the files of a set: brought, already there, failed (and why), without address."""
 
     brought: list[str] = field(default_factory=list)
     present: list[str] = field(default_factory=list)
