@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from wayfuse.core.errors import MapError
 from wayfuse.core.jit import kernel
-from wayfuse.maps._kernels import crosses_one
+from wayfuse.maps._kernels import crosses_many, crosses_one
 from wayfuse.maps.walls import LONGEST_MOVE, WallIndex
 
 
@@ -151,9 +151,10 @@ def test_float32_moves_mean_their_float64_values():
     moves = [m.astype(np.float32) for m in random_moves(rng, 20_000, walls)]
     arrays = WallIndex.build(walls).arrays
 
-    out = np.empty(len(moves[0]), np.bool_)
-    inside_another_kernel(*moves, *arrays, out)
-    assert np.array_equal(out, brute(walls, *moves))
+    for run in (inside_another_kernel, crosses_many):
+        out = np.empty(len(moves[0]), np.bool_)
+        run(*moves, *arrays, out)
+        assert np.array_equal(out, brute(walls, *moves))
 
 
 def test_numbers_that_are_none_cross_nothing():

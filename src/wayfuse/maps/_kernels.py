@@ -96,8 +96,26 @@ def crosses_many(
     walls: Array,
     out: BoolArray,
 ) -> None:
-    """`crosses_one` of each of n moves into ``out`` (n,)."""
-    for i in range(len(x0)):
+    """`crosses_one` of each of n moves (float64 or float32) into ``out`` (n,); other kernels may call it too.
+
+    The moves that the clearance does not settle are gathered first, without a branch: several times faster than
+    `crosses_one` in a loop, whose branches a cloud of particles makes unpredictable.
+    """
+    n, m = len(x0), 0
+    todo = np.empty(n, np.int64)
+    ny, nx = clearance.shape
+    for i in range(n):
+        sx, sy = np.float64(x0[i]), np.float64(y0[i])
+        dx, dy = np.float64(x1[i]) - sx, np.float64(y1[i]) - sy
+        length2 = dx * dx + dy * dy
+        u, v = (sx - grid[0]) * grid[2], (sy - grid[1]) * grid[2]
+        on = (u >= 0.0) & (v >= 0.0) & (u < nx) & (v < ny)
+        free = clearance[int(v) if on else 0, int(u) if on else 0] * grid[3]
+        out[i] = False
+        todo[m] = i
+        m += (on & (not length2 < free * free)) | (length2 > grid[5] * grid[5])
+    for k in range(m):
+        i = todo[k]
         out[i] = crosses_one(x0[i], y0[i], x1[i], y1[i], grid, clearance, start, packed, walls)
 
 

@@ -14,8 +14,9 @@ leave to that side.
 
 `WallIndex` answers without looking at every wall, and with the same answer for every move: (1) a *clearance
 field* of 0.25 m cells holds the distance that is free around the cell; a shorter move crosses nothing. (2) A
-*cell list* of 1 m cells holds copies of all walls within the longest move (3 m) of the cell, nearest first: those
-farther away than the move is long are not looked at. A move of more than 3 m is tested against every wall.
+*cell list* of 1 m cells holds copies of all walls within the longest move (3 m) of the cell, nearest first:
+those farther away than the move is long are not looked at. A move of more than 3 m is tested against every
+wall.
 
 >>> index = WallIndex.build(np.array([[0.0, 1.0, 2.0, 1.0]]))
 >>> index.crosses([1.0, 3.0], [0.0, 0.0], [1.0, 3.0], [2.0, 2.0]).tolist()
