@@ -278,9 +278,8 @@ def on_acceleration(s: Array, p: Array, t: float, dt: float, x: float, y: float,
         return False
     peak = s[at.S_PEAK]
     s[at.S_PEAK] = 0.0
-    if peak <= max(p[at.P_THRESHOLD], p[at.P_RELATIVE] * s[at.S_LEVEL]):
-        return False
-    if s[at.S_SHAKEN] > 0.0 or t - s[at.S_T_STEP] < p[at.P_INTERVAL]:
+    is_weak = peak <= max(p[at.P_THRESHOLD], p[at.P_RELATIVE] * s[at.S_LEVEL])
+    if is_weak or s[at.S_SHAKEN] > 0.0 or t - s[at.S_T_STEP] < p[at.P_INTERVAL]:
         return False
     finish_step(s, p, t, peak, e)
     return True

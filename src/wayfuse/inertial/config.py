@@ -1,7 +1,8 @@
 """Parameters of the inertial front end.
 
-The figures named "table" are printed by ``python -m benchmarks.inertial`` (survey walks of ms-indoor, the
-optimisation walks of oxford-steps, the ipin2023-track3 logs); docs of the data sets say what those are.
+Figures are of the survey walks of ms-indoor, of ipin2023-track3 ("ipin") and of the optimisation walks of
+oxford-steps, whose unrecorded counts were taken from their cadence (autocorrelation, not causal). Those of
+headings and step lengths are printed by ``python -m benchmarks.inertial``.
 """
 
 from __future__ import annotations
@@ -43,10 +44,10 @@ class InertialConfig:
         0.2  # s before a step is declared at which its heading is read: delay of the filters
     )
     # "pulled": the gyro's yaw, drawn to the absolute heading; "orientation": the absolute heading itself.
-    # Turn error between successive straight segments, median: pulled 3.9 deg, rotation vector 7.4 deg (ipin);
-    # 6.6 and 9.0 deg (ms-indoor), at the same absolute error.
+    # Turn error between successive straight segments, median: pulled 4.9 deg, rotation vector 8.8 deg (ipin);
+    # 9.0 and 10.7 deg (ms-indoor), at the same absolute error (table in `heading`).
     heading_source: Literal["pulled", "orientation"] = "pulled"
-    heading_tau: float = 20.0  # s; 10 s: turn error 5.1 deg (ipin); 40 s: a biased gyro pulls away
+    heading_tau: float = 20.0  # s; 10 s: turn error 6.1 deg (ipin); 40 s: absolute error 9.0 instead of 7.8
     bias_time: float = 15.0  # s, least span over which a bias of the gyro is judged
     bias_drift: float = (
         1.0  # rad of drift in a block that is no disturbed field but a bias: 0.7 harms good gyros
