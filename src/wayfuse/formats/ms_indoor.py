@@ -220,7 +220,8 @@ class _Careful:
         if starts and starts[0] > 0:
             self._report.add("unreadable text before a record", number)
         if not starts:
-            self._fault("not a record" if line.isascii() else "not a record (no text)", number)
+            self._fault("not a record", number)
+            return
         for k, (start, stop) in enumerate(zip(starts, [*starts[1:], len(line)], strict=True)):
             self._record(line[start:stop].split(b"\t"), number, last=k == len(starts) - 1)
 
