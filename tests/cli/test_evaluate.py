@@ -3,6 +3,7 @@ from __future__ import annotations
 import json
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -176,6 +177,26 @@ def test_the_site_of_the_sidecar_orders_the_floors(tmp_path: Path, walks: Path) 
     result = run(path, walks, "--site", tmp_path / "house")
     assert isinstance(result.exception, UsageError)
     assert "no floor 'roof'" in str(result.exception)
+
+
+def test_the_radio_map_splits_by_distance(
+    table: Path, walks: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from wayfuse.radio.survey import Survey
+
+    survey = Survey.from_dense(np.full((1, 1), -50.0), np.array([(0.0, 0.0)]), np.array([0]), ("F1",))
+    asked: list[Path] = []
+
+    def load(path: Path) -> SimpleNamespace:
+        asked.append(path)
+        return SimpleNamespace(survey=survey)
+
+    monkeypatch.setattr("wayfuse.radio.walk_survey.load", load, raising=False)
+    methods = report(table, walks, "--radio-map", tmp_path / "map")["methods"]
+    assert asked == [tmp_path / "map"]
+    assert isinstance(methods, dict)
+    split = methods["fused"]["by_survey_distance"]
+    assert {label: s["n"] for label, s in split.items()} == {"<= 2 m": 3, "2-5 m": 9, "> 5 m": 15}
 
 
 @pytest.mark.parametrize(

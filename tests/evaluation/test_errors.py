@@ -96,13 +96,16 @@ def test_last_at_or_before_equals_a_search(t: list[float], at: list[float]) -> N
     assert last_at_or_before(np.array(ascending), ask).tolist() == expected
 
 
-def test_a_row_at_the_very_time_counts_despite_rounding() -> None:
-    start = 1_574_661_471.585
+@settings(max_examples=80)
+@given(st.floats(1.5e9, 1.6e9))
+def test_a_row_at_the_very_time_counts_despite_rounding(start: float) -> None:
     row = start + 5.0
     points = (Waypoint(start, 0, 0, "F1"), Waypoint(start + 10, 10, 0, "F1"))
-    rounded = float(f"{row * 1000:.3f}") / 1000
+    rounded = float(f"{row * 1000:.3f}") / 1000  # through EST.csv
     found = score([track([rounded], [(5.0, 0.0)])], [recording(waypoints=points, scans=(row,))])
-    assert only(found)[0] == pytest.approx(0.0, abs=1e-6)
+    times = found.methods[0].points["1hz"].used()
+    assert times.error[0] == pytest.approx(0.0, abs=1e-6)
+    assert len(times) == 6
 
 
 def test_missing_times_are_counted_not_dropped() -> None:
