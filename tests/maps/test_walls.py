@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from wayfuse.core.errors import MapError
 from wayfuse.core.jit import kernel
-from wayfuse.maps._kernels import crosses_many, crosses_one
+from wayfuse.maps._kernels import brute_one, crosses_many, crosses_one
 from wayfuse.maps.walls import LONGEST_MOVE, WallIndex
 
 
@@ -190,16 +190,26 @@ def test_ten_million_moves_on_random_maps():
         assert disagreements(walls, moves) == 0
 
 
+@kernel
+def compiled_brute(x0, y0, x1, y1, walls, out):
+    for i in range(len(x0)):
+        out[i] = brute_one(x0[i], y0[i], x1[i], y1[i], walls)
+
+
 @pytest.mark.slow
 @pytest.mark.real_data
-def test_no_disagreement_on_real_floors(ms_indoor):
+def test_ten_million_moves_on_real_floors(ms_indoor):
+    """The index against the compiled definition, and that against NumPy on a part."""
     from wayfuse.maps.importers.ms_indoor import import_site
 
     site, _ = import_site(ms_indoor)
     rng = np.random.default_rng(8)
     for floor in site.floors:
-        for walls, index in ((floor.walls, floor.wall_index), (floor.barriers, floor.barrier_index)):
-            moves = random_moves(rng, 100_000, walls)
-            expected = brute(walls, *moves)
+        for index in (floor.wall_index, floor.barrier_index):
+            moves = random_moves(rng, 1_000_000, index.arrays.walls)
+            expected = np.empty(moves.shape[1], np.bool_)
+            compiled_brute(*moves, index.arrays.walls, expected)
             assert expected.any()
             assert np.array_equal(index.crosses(*moves), expected)
+            part = moves[:, :20_000]
+            assert np.array_equal(brute(index.arrays.walls, *part), expected[:20_000])

@@ -96,9 +96,9 @@ def crosses_many(
     walls: Array,
     out: BoolArray,
 ) -> None:
-    """`crosses_one` of each of n moves (float64 or float32) into ``out`` (n,); other kernels may call it too.
+    """`crosses_one` of n moves (float64 or float32) into ``out`` (n,); other kernels may call it too.
 
-    The moves that the clearance does not settle are gathered first, without a branch: several times faster than
+    Moves that the clearance does not settle are gathered first, without a branch: several times faster than
     `crosses_one` in a loop, whose branches a cloud of particles makes unpredictable.
     """
     n, m = len(x0), 0
