@@ -3,8 +3,8 @@
     python benchmarks/walls.py [--site SITE] [--moves 1000] [--rounds 12]
 
 Without a site the map is a made-up arcade of shops. Variants take turns, each on the same few clouds of
-moves in a row (a filter, too, asks again and again about one neighbourhood). Thread CPU time is taken; minimum
-and median are printed with their ratio to the index. All variants must agree on every move.
+moves in a row (a filter, too, asks again and again about one neighbourhood). Thread CPU time is taken;
+minimum and median are printed with their ratio to the index. All variants must agree on every move.
 """
 
 from __future__ import annotations
