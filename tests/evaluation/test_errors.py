@@ -108,6 +108,13 @@ def test_a_row_at_the_very_time_counts_despite_rounding(start: float) -> None:
     assert len(times) == 6
 
 
+def test_a_scan_at_the_very_time_counts_despite_rounding() -> None:
+    assert 1.14 + 1.0 < 2.14  # the grid's time falls short of the scan's by a rounding
+    points = (Waypoint(1.14, 0, 0, "F1"), Waypoint(5.14, 4, 0, "F1"))
+    found = score([track([1.2], [(0.0, 0.0)])], [recording(waypoints=points, scans=(2.14,))])
+    assert only(found).tolist() == pytest.approx([1, 2, 3, 4])
+
+
 def test_missing_times_are_counted_not_dropped() -> None:
     found = score([track([105.0], [(5.0, 0.0)])], [recording()])
     points = found.methods[0].points["1hz"]

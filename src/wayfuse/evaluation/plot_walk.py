@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 __all__ = ["walk_figure"]
 
 _MAX_PANELS = 4
-_MARGIN, _LEAST = 8.0, 40.0  # m around what is shown, and the least extent shown
+_MARGIN, _LEAST = 6.0, 24.0  # m around what is shown, and the least extent shown
 _N_ELLIPSES = 7  # per method and walk
 _RHO95 = 2.4477468306808166  # radius in standard deviations that holds 95 % of a Gaussian in the plane
 _OVER = 10.0  # z-order of what lies over the plan
@@ -154,13 +154,13 @@ def _truth(ax: Axes, truth: Truth, floor: str, shift: Array) -> None:
 
 def _marks(ax: Axes, truth: Truth, floor: str, shift: Array) -> None:
     """Start and end of the truth."""
-    for row, text, symbol in ((0, "start", "^"), (-1, "end", "s")):
+    for row, text, symbol, side in ((0, "start", "^", 1), (-1, "end", "s", -1)):
         if truth.floor[row] != floor:
             continue
         x, y = truth.xy[row] + shift
         ax.plot([x], [y], symbol, color=_TRUTH, markersize=9, markeredgecolor="white", zorder=_OVER + 7)
         box = {"boxstyle": "round,pad=0.15", "fc": "white", "ec": "none", "alpha": 0.8}
-        ax.annotate(text, (x, y), (7, 7), textcoords="offset points", fontsize=9, color=_TRUTH,
+        ax.annotate(text, (x, y), (7, 9 * side), textcoords="offset points", fontsize=9, color=_TRUTH,
                     zorder=_OVER + 8, bbox=box)  # fmt: skip
 
 

@@ -129,9 +129,12 @@ def cdf_figure(scores: Scores, missing: str = "skip") -> Figure:
 def _spans(points: Sequence[PointErrors]) -> Array:
     """Ends (s) of spans of time since the first scan, to where one walk in twenty is still going on."""
     since = np.concatenate([p.since_start for p in points])
-    end = float(np.percentile(since, 95)) if len(since) else 5.0
-    width = next((w for w in (2.5, 5.0, 10.0, 20.0, 30.0, 60.0, 120.0, 300.0) if end / w <= 16), 600.0)
-    return np.asarray(np.arange(0.0, max(end, width) + 0.5 * width, width))
+    low, high = np.percentile(since, (1, 95)).tolist() if len(since) else (0.0, 5.0)
+    width = next(
+        (w for w in (2.5, 5.0, 10.0, 20.0, 30.0, 60.0, 120.0, 300.0) if (high - low) / w <= 16), 600.0
+    )
+    first = width * np.floor(low / width)
+    return np.asarray(np.arange(first, max(high, first + width) + 0.5 * width, width))
 
 
 def _binned(points: PointErrors, edges: Array, figure_of: Any) -> tuple[Array, Array]:
@@ -175,7 +178,8 @@ def error_by_time_figure(scores: Scores, missing: str = "skip") -> Figure:
              for a, b in pairwise(edges)]  # fmt: skip
     below.bar(edges[:-1], going, width=np.diff(edges), align="edge", color="#c9d3da", edgecolor="white")
     _axes(below, "time since the first Wi-Fi scan (s)", "walks", "")
-    below.set_xlim(0.0, edges[-1])
+    below.set_xlim(edges[0], edges[-1])
+    below.yaxis.get_major_locator().set_params(integer=True)
     return figure
 
 
@@ -217,7 +221,7 @@ def calibration_figure(scores: Scores, missing: str = "skip") -> Figure | None:
           "Coverage: below the diagonal is over-confident")  # fmt: skip
     for mark in (68, 95):
         left.axvline(mark, color="#8c8c8c", linewidth=0.8, linestyle=(0, (2, 3)), zorder=1)
-    right.set_xlim(0.0, edges[-1])
+    right.set_xlim(edges[0], edges[-1])
     right.set_ylim(bottom=0.0)
     _axes(right, "time since the first Wi-Fi scan (s)", "radius (m)", "Stated r95 and what it should be")
     _legend(left, "upper left")

@@ -177,7 +177,7 @@ def truth_of(recording: Recording, frame: CommonFrame | None = None) -> Truth | 
         t=t,
         xy=xy,
         floor=floor,
-        start=float(t[0]) if radio is None else max(float(t[0]), radio),
+        start=float(t[0]) if radio is None else radio,
         has_radio=radio is not None,
         plane=plane,
     )
