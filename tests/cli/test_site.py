@@ -71,7 +71,8 @@ def test_show_one_floor_as_svg_beside_the_site(plans, tmp_path):
     assert shown.output.splitlines() == [str(tmp_path / "site" / "pictures" / "F1.svg")]
     svg = (tmp_path / "site" / "pictures" / "F1.svg").read_text()
     assert svg.count("<svg") == 1
-    assert "Date" not in svg
+    run("show", tmp_path / "site", "--floor", "F1", "--svg", "--out", tmp_path)
+    assert (tmp_path / "F1.svg").read_text() == svg
 
 
 def test_json(plans, tmp_path):

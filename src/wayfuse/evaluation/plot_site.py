@@ -45,7 +45,7 @@ OTHER_UNIT = "#ebe9e4"
 UNNAMED = frozenset({"closed area", "auxiliary", "void", "vacant", "rest area", "parking bay", "toilet"})
 MARGIN = 0.03  # of the larger side, around the plan
 FONT_SIZES = (8.0, 7.0, 6.0, 5.0, 4.2)  # pt, tried in turn
-CLEAR = 1.1  # a name needs this much of its own width
+CLEAR, GLYPH_HEIGHT = 1.1, 1.15  # a name needs this much of its own width, of its font size in height
 
 
 def draw_floor(ax: Axes, floor: Floor, *, walkable: bool = False, names: bool = True) -> None:
@@ -103,9 +103,12 @@ def floor_figure(floor: Floor, title: str = "", *, walkable: bool = True, width:
 
 
 def save_figure(figure: Figure, path: Path) -> Path:
-    """Write a figure as PNG or SVG, by the suffix of ``path``, without a time stamp; returns the path."""
+    """Write a figure as PNG or SVG, by the suffix of ``path``; the same figure gives the same bytes."""
+    import matplotlib as mpl
+
     metadata: dict[str, Any] = {"Date": None} if path.suffix == ".svg" else {"Software": None}
-    figure.savefig(path, dpi=160, metadata=metadata)
+    with mpl.rc_context({"svg.hashsalt": "wayfuse"}):
+        figure.savefig(path, dpi=160, metadata=metadata)
     return path
 
 
@@ -239,18 +242,30 @@ def _literal(text: str) -> str:
 
 
 def _fit(unit: Unit, width: float, metres_per_point: float) -> tuple[float, float, float, float] | None:
-    """Place (m), font size (pt) and turn (degrees) of a name inside its unit, or None; ``width`` per pt."""
+    """Place (m), font size (pt) and turn (degrees) of a name inside its unit, or None; ``width`` per pt.
+
+    Level or upright names are preferred to those along the longer axis of the unit.
+    """
     import shapely
+    from shapely.affinity import rotate
 
     shape = shapely.Polygon(unit.polygon.exterior, [*unit.polygon.holes])
-    inner = shapely.maximum_inscribed_circle(shape, tolerance=0.5)
-    spots = [shape.centroid, shapely.get_point(inner, 0)]
+    spots = [shape.centroid, shapely.get_point(shapely.maximum_inscribed_circle(shape, tolerance=0.5), 0)]
     shapely.prepare(shape)
-    for size in FONT_SIZES:
-        across = 0.5 * width * size * metres_per_point
-        along = 0.5 * 1.15 * size * metres_per_point
-        for turn, (w, h) in ((0.0, (across, along)), (90.0, (along, across))):
-            for spot in spots:
-                if shape.contains(shapely.box(spot.x - w, spot.y - h, spot.x + w, spot.y + h)):
-                    return float(spot.x), float(spot.y), size, turn
+    axis = _axis(shapely.get_coordinates(shapely.minimum_rotated_rectangle(shape)))
+    for turns in ((0.0, 90.0), (axis,)):
+        for size in FONT_SIZES:
+            w, h = 0.5 * width * size * metres_per_point, 0.5 * GLYPH_HEIGHT * size * metres_per_point
+            for turn in turns:
+                for spot in spots:
+                    box = shapely.box(spot.x - w, spot.y - h, spot.x + w, spot.y + h)
+                    if shape.contains(rotate(box, turn, origin="center")):
+                        return float(spot.x), float(spot.y), size, turn
     return None
+
+
+def _axis(rectangle: Array) -> float:
+    """Direction of the longer side of a rectangle (5, 2), degrees in (-90, 90]."""
+    sides = np.diff(rectangle[:3], axis=0)
+    dx, dy = sides[int(np.argmax(np.hypot(*sides.T)))]
+    return float(90.0 - (90.0 - np.rad2deg(np.arctan2(dy, dx))) % 180.0)
