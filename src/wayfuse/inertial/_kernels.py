@@ -255,8 +255,7 @@ def filter_acceleration(s: Array, p: Array, t: float, dt: float, x: float, y: fl
     vertical = low_pass(s, at.S_VERTICAL, g_high, ux * x + uy * y + uz * z)
     s[at.S_VMAX], s[at.S_VMIN] = max(s[at.S_VMAX], vertical), min(s[at.S_VMIN], vertical)
     s[at.S_SUM] += abs(band)
-    s[at.S_COUNT] += 1.0
-    s[at.S_VALLEY] = min(s[at.S_VALLEY], band)
+    s[at.S_COUNT], s[at.S_VALLEY] = s[at.S_COUNT] + 1.0, min(s[at.S_VALLEY], band)
     return band
 
 
@@ -288,10 +287,8 @@ def on_acceleration(s: Array, p: Array, t: float, dt: float, x: float, y: float,
 @kernel
 def finish_step(s: Array, p: Array, t: float, peak: float, event: Array) -> None:
     """Write a completed step and start the next."""
-    duration = t - s[at.S_T_STEP]
-    is_first = not duration <= at.BOUT_GAP
-    if is_first:
-        duration = at.USUAL_STEP
+    is_first = not t - s[at.S_T_STEP] <= at.BOUT_GAP
+    duration = at.USUAL_STEP if is_first else t - s[at.S_T_STEP]
     heading = recall_heading(s, t - p[at.P_DELAY])
     yaw = s[at.S_YAW] if t - s[at.S_T_GYRO] <= p[at.P_STALE] else heading
     event[at.E_T], event[at.E_DURATION], event[at.E_HEADING] = t, duration, heading
@@ -354,6 +351,8 @@ def consume(
         return False
     norm = np.sqrt(a * a + b * b + c * c + d * d)
     if norm > 0.5:  # a rotation vector is of unit length
+        if elapsed > p[at.P_GAP]:  # another source had been pulling, or none
+            s[at.S_OFFSET_TIME] = 0.0
         s[at.S_T_RV] = t
         o = at.S_RV
         s[o], s[o + 1], s[o + 2], s[o + 3] = a / norm, b / norm, c / norm, d / norm

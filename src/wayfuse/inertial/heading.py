@@ -39,7 +39,7 @@ own 9-axis, pulled    9.4, 10.6, 12.9,  9.0  8.9, 13.4, 16.0,  4.4
 magnetometer alone   10.0, 10.8, 16.1, 12.9  8.4,  7.7, 12.5, 10.5
 ==================== ====================== ======================
 
-(bias kept: 20 s without the bias rule.) Part of each figure is the walker, who does not walk the straight line.
+(bias kept: 20 s without the bias rule.) Part of each figure is the walker, who strays from the straight line.
 """
 
 from __future__ import annotations
