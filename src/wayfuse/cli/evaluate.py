@@ -214,10 +214,10 @@ def _read(paths: Sequence[Path]) -> Iterator[Recording]:
 
 
 def _bar(items: Sequence[Any], label: str) -> Any:
-    if len(items) < _BAR_FROM:
-        return nullcontext(items)
     import sys
 
+    if len(items) < _BAR_FROM or not sys.stderr.isatty():
+        return nullcontext(items)
     return click.progressbar(items, label=label, file=sys.stderr)
 
 

@@ -98,9 +98,10 @@ def replicated_percentiles(
     order = np.argsort(values, kind="stable")
     ascending, column = values[order], walk[order]
     out = np.full((len(counts), len(percents)), np.nan)
+    narrow = counts.astype(np.int32)
     step = max(1, _CHUNK // max(1, len(values)))
     for start in range(0, len(counts), step):
-        cumulated = np.cumsum(counts[start : start + step][:, column], axis=1)
+        cumulated = np.cumsum(narrow[start : start + step][:, column], axis=1, dtype=np.int32)
         for i, row in enumerate(cumulated):
             total = int(row[-1])
             if total == 0:
