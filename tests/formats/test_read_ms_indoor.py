@@ -97,7 +97,9 @@ def test_every_kind_of_record_arrives_in_its_units(tmp_path: Path) -> None:
         (bssid_id("67:FA:40:46:5F:36"), -75),
     ]
     assert r.ble[1].tx_power == -65
-    assert r.waypoints == ((1574661471.585, 212.72197, 151.0766, "F4", r.waypoints[0].lat, r.waypoints[0].lon),)
+    assert r.waypoints == (
+        (1574661471.585, 212.72197, 151.0766, "F4", r.waypoints[0].lat, r.waypoints[0].lon),
+    )
     assert (r.site, r.floor, r.device.brand, r.device.model) == ("Mall", "F4", "OPPO", "PBCM10")
     assert r.report.n_lines == 16
     assert r.report.n_bad == 0
@@ -256,7 +258,9 @@ def test_hashed_identifiers_of_the_larger_edition(tmp_path: Path) -> None:
 
 def test_a_beacon_heard_twice_is_one_advertisement(tmp_path: Path) -> None:
     blue = "1574661471800\tTYPE_BLUE\tx\tE0:78:A3:3E:97:BD\t-78"
-    beacon = "1574661471900\tTYPE_BEACON\tU\t0\t0\t-56\t-78\t11.687424064721569\tE0:78:A3:3E:97:BD\t1574661471900"
+    beacon = (
+        "1574661471900\tTYPE_BEACON\tU\t0\t0\t-56\t-78\t11.687424064721569\tE0:78:A3:3E:97:BD\t1574661471900"
+    )
     r = ms_indoor.read(write(tmp_path, [blue, beacon]))
     assert [(b.t, b.rssi, b.tx_power) for b in r.ble] == [(1574661471.8, -78, -56)]
 

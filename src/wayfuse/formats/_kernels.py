@@ -55,6 +55,8 @@ _WORDS = np.array(
 _U = np.uint64
 _LOW7, _HIGH, _ONES = _U(0x7F7F7F7F7F7F7F7F), _U(0x8080808080808080), _U(0x0101010101010101)
 _TABS, _NEWLINES = _U(0x0909090909090909), _U(0x0A0A0A0A0A0A0A0A)
+_YS = _U(0x5959595959595959)
+_FIVE, _TYPE = _U(0xFFFFFFFFFF), _U(int.from_bytes(b"TYPE_", "little"))
 _NIBBLES, _THREES, _SIXES = _U(0xF0F0F0F0F0F0F0F0), _U(0x3333333333333333), _U(0x0606060606060606)
 
 _EXACT = 1 << 53  # integers up to here are float64
@@ -205,9 +207,12 @@ def _motion(buf: Bytes, i: int, out: Array) -> int:
 
 @kernel
 def _radio(buf: Bytes, word: IdArray, kind: int, stop: int, n_tabs: int, out: Array) -> tuple[int, int]:
-    """Fields of a radio record from its end backwards: place of the identifier, -1 where one is amiss."""
+    """Fields of a radio record, read from its end; start and stop of the identifier, -1 where one is amiss.
+
+    n_tabs : tabs from the one behind the name on.
+    """
     if kind == _WIFI:
-        if n_tabs != 6 or buf[stop - 14] != _TAB:
+        if n_tabs != 5 or buf[stop - 14] != _TAB:
             return -1, -1
         seen = _digits13(word, stop - 13)
         frequency_at = _field_start(buf, stop - 14)
@@ -221,13 +226,13 @@ def _radio(buf: Bytes, word: IdArray, kind: int, stop: int, n_tabs: int, out: Ar
     if kind == _BLUE:
         rssi_at = _field_start(buf, stop)
         rssi, k = _decimal(buf, rssi_at)
-        if n_tabs != 4 or k != stop:
+        if n_tabs != 3 or k != stop:
             return -1, -1
         out[0], out[1] = rssi, np.nan
         return _field_start(buf, rssi_at - 1), rssi_at - 1
-    if n_tabs == 9:  # the newer form repeats the time at the end
+    if n_tabs == 8:  # the newer form repeats the time at the end
         stop = _field_start(buf, stop) - 1
-    elif n_tabs != 8:
+    elif n_tabs != 7:
         return -1, -1
     start = _field_start(buf, stop)
     rssi_at = _field_start(buf, _field_start(buf, start - 1) - 1)
@@ -278,23 +283,29 @@ def scan_ms_indoor(
             good = stop >= 0
             i = stop if good else i
         if not good:
+            if kind >= 0:
+                i += 13 + _LENGTH[kind]  # on the tab before the fields
             n_tabs = 0
+            n_letters = 0
             while True:
                 w = word[i]
                 ends, marks = _equal_bytes(w, _NEWLINES), _equal_bytes(w, _TABS)
+                letters = _equal_bytes(w, _YS)
                 if ends:
                     below = (ends & (~ends + _U(1))) - _U(1)
                     n_tabs += _n_bytes(marks & below)
+                    n_letters += _n_bytes(letters & below)
                     i += _n_bytes(below & _HIGH)
                     break
                 n_tabs += _n_bytes(marks)
+                n_letters += _n_bytes(letters)
                 i += 8
             if kind >= _UNCALIBRATED:
-                good = n_tabs == (4 if kind == _BLU4 else 8)
-            elif kind >= _WIFI:
+                good = n_tabs == (3 if kind == _BLU4 else 7) and n_letters == 0
+            elif kind >= _WIFI and (kind == _WIFI or n_letters == 0):  # a name may hold Y, and TYPE_ does
                 row = counts[kind]
                 first, last = _radio(buf, word, kind, i, n_tabs, values[kind, row])
-                good = last > first
+                good = last > first and (word[first] & _FIVE) != _TYPE
                 if good:
                     identifier = _address(buf, first) if last - first == 17 else _U(1) << _U(63)
                     if identifier >> _U(63):
