@@ -165,7 +165,7 @@ def test_small_blocks_give_the_same_recording(ms_indoor_paths: list[Path]) -> No
 def careful_only(path: Path, monkeypatch: pytest.MonkeyPatch) -> Recording:
     """Read with a scanner that hands every line to the careful path."""
 
-    def hand_over(buf, word, n, line, t, values, ids, token, care, counts):  # noqa: ANN001, ANN202
+    def hand_over(buf, word, n, line, t, values, ids, token, care, counts):
         data = bytes(buf[:n])
         start = k = number = 0
         while start < n:
@@ -183,7 +183,7 @@ def careful_only(path: Path, monkeypatch: pytest.MonkeyPatch) -> Recording:
         return ms_indoor.read(path)
 
 
-CHARACTERS = st.sampled_from(list("0123456789.-+eE\t\t:#aFnNTYPE_W \r\x00é") + ["\n", "1574661471701\tTYPE_"])
+CHARACTERS = st.sampled_from([*"0123456789.-+eE\t\t:#aFnNTYPE_W \r\x00é\n", "1574661471701\tTYPE_"])
 EDIT = st.tuples(st.integers(0, 2000), st.integers(0, 3), st.lists(CHARACTERS, max_size=4).map("".join))
 
 
@@ -246,8 +246,8 @@ def test_an_ssid_may_hold_anything(tmp_path: Path, ssid: str) -> None:
 
 
 def test_hashed_identifiers_of_the_larger_edition(tmp_path: Path) -> None:
-    token = "4a93b1fd3bf4cd98ee25d08bfcb31b1ba0d4ba2d"
-    wifi = f"1574661473481\tTYPE_WIFI\t7182afc4e5c212133d5d7d76eb3df6c24618302b\t{token}\t-40\t5825\t1574661473400"
+    token = "4a93b1fd3bf4cd98ee25d08bfcb31b1ba0d4ba2d"  # noqa: S105 (a digest)
+    wifi = f"1574661473481\tTYPE_WIFI\t7182afc4e5c212133d5d7d76eb3d\t{token}\t-40\t5825\t1574661473400"
     beacon = f"1574661473482\tTYPE_BEACON\tu\tm\tn\t-62\t-79\t4.66\t{token}"
     r = ms_indoor.read(write(tmp_path, [wifi, wifi.replace("-40", "-41"), beacon]))
     assert r.wifi[0].bssid.tolist() == [bssid_id(token)] * 2

@@ -165,10 +165,10 @@ class _Lines:
         column, first, count, n_fields = _SERIES[f[0]]
         if len(f) not in {n_fields, n_fields + 1}:
             return f"{f[0].decode()}: {len(f)} fields of {n_fields + 1}"
-        fields = f[first : first + count]
-        if not all(map(is_number, fields)):
+        try:
+            values = tuple(map(float, f[first : first + count]))
+        except ValueError:
             return f"{f[0].decode()}: not a number where one is due"
-        values = tuple(map(float, fields))
         if column == "orientation":
             x, y, z = values
             values = (math.sqrt(max(0.0, 1.0 - x * x - y * y - z * z)), x, y, z)

@@ -121,6 +121,30 @@ def _piece(name: str, batch: Batch, report: ReadReport) -> Piece:
         if batch.rows:
             report.add(f"{batch.sensor}: no column {', '.join(missing)}", batch.lines[0], len(batch.rows))
         return Piece()
+    columns = {} if kind in {"wifi", "ble"} else _plain_columns(kind, wanted, batch)
+    if not columns:
+        columns = _careful_columns(name, batch, report)
+    _count(report, batch.sensor, len(columns[kind].t) if kind in columns else 0)
+    return Piece(columns)
+
+
+def _plain_columns(kind: str, wanted: tuple[str, ...], batch: Batch) -> dict[str, Column]:
+    """Columns of a motion sensor whose fields are all numbers; nothing where one of them is not."""
+    if not batch.rows:
+        return {}
+    fields = dict(zip(batch.columns, zip(*batch.rows, strict=True), strict=True))
+    try:
+        t = np.array([int(text) / 1e9 for text in fields["time"]])
+        values = np.column_stack([np.array([float(text) for text in fields[c]]) for c in wanted])
+    except ValueError:
+        return {}
+    return {kind: Column(np.array(batch.lines, np.int64), t, values, np.empty(0, np.uint64))}
+
+
+def _careful_columns(name: str, batch: Batch, report: ReadReport) -> dict[str, Column]:
+    """Columns of any sensor, row by row; a row with a fault is counted."""
+    kind, wanted = _SENSORS[name]
+    optional = _OPTIONAL.get(name, "")
     place = {c: k for k, c in enumerate(batch.columns)}
     time, rows = place["time"], Rows()
     for line, row in zip(batch.lines, batch.rows, strict=True):
@@ -140,9 +164,7 @@ def _piece(name: str, batch: Batch, report: ReadReport) -> Piece:
             report.add(f"{batch.sensor}: not a number where one is due", line)
             continue
         rows.add(kind, line, t, values, identifier)
-    columns = rows.columns()
-    _count(report, batch.sensor, len(columns[kind].t) if kind in columns else 0)
-    return Piece(columns)
+    return rows.columns()
 
 
 def _seconds(text: str) -> float:

@@ -74,7 +74,7 @@ def batches(path: Path, report: ReadReport) -> Iterator[Batch]:
     FormatError : the ZIP is broken, encrypted, over the limits or holds more than one recording.
     """
     if path.is_dir():
-        for file in sorted(path.glob("*.csv")):
+        for file in sorted(p for p in path.iterdir() if p.suffix.lower() == ".csv"):
             with file.open("rb") as stream:
                 yield from _csv_batches(file.stem, stream, report)
     elif zipfile.is_zipfile(path):
