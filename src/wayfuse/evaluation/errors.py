@@ -31,6 +31,7 @@ __all__ = [
     "Scores",
     "Summary",
     "last_at_or_before",
+    "places_in_frame",
     "score",
     "summarise",
     "survey_distances",
@@ -242,7 +243,7 @@ def score(
         grids = {at: _Grid.of(truth, at, frame, survey) for at in TIMES}
         for name in tracks:
             track = tracks[name].get(walk)
-            xy = None if track is None else _in_frame(track, truth, frame)
+            xy = None if track is None else places_in_frame(track, truth, frame)
             if track is not None and xy is not None:
                 rows[name].append((track, {at: grids[at].errors(index, track, xy, frame) for at in TIMES}))
             elif track is not None:
@@ -307,8 +308,8 @@ def _truths(
     return truths, unscored, notes, reports
 
 
-def _in_frame(track: WalkEstimates, truth: Truth, frame: CommonFrame) -> Array | None:
-    """Estimates (n, 2) in the frame of the truth, None where they cannot be taken there."""
+def places_in_frame(track: WalkEstimates, truth: Truth, frame: CommonFrame) -> Array | None:
+    """Estimates (n, 2) m in the frame of the truth, None where they cannot be taken there."""
     if truth.plane is None:
         return np.asarray(track.xy + frame.shift(track.floor))
     return truth.plane.to_xy(track.lonlat) if np.all(np.isfinite(track.lonlat)) else None

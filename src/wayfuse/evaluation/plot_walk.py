@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wayfuse.core.types import Array
-from wayfuse.evaluation.errors import MethodScores, Scores, summarise
+from wayfuse.evaluation.errors import MethodScores, Scores, places_in_frame, summarise
 from wayfuse.evaluation.estimates_file import WalkEstimates
 from wayfuse.evaluation.plots import INK, new_figure, shown, style
 from wayfuse.evaluation.truth import Truth
@@ -69,12 +69,6 @@ def _shift(scores: Scores, floor: str) -> Array:
     return np.asarray(-scores.frame.shift(np.array([floor]))[0])
 
 
-def _common_xy(scores: Scores, track: WalkEstimates, truth: Truth) -> Array | None:
-    if truth.plane is None:
-        return np.asarray(track.xy + scores.frame.shift(track.floor))
-    return truth.plane.to_xy(track.lonlat) if np.all(np.isfinite(track.lonlat)) else None
-
-
 def _track(method: MethodScores, walk: str) -> WalkEstimates | None:
     return next((track for track in method.tracks if track.walk == walk), None)
 
@@ -84,13 +78,12 @@ def _true_floor(truth: Truth, t: Array) -> NDArray[np.str_]:
 
 
 def _window(scores: Scores, truth: Truth, floor: str) -> tuple[Array, Array]:
-    """Corners (m, floor's frame) of what is shown: truth and most of the estimates while it is on the
-    floor."""
+    """Corners (m, floor's frame) of what is shown: truth on the floor, most of the estimates meanwhile."""
     shift = _shift(scores, floor)
     places = [truth.xy[truth.floor == floor] + shift]
     for method in scores.methods:
         track = _track(method, truth.walk)
-        xy = None if track is None else _common_xy(scores, track, truth)
+        xy = None if track is None else places_in_frame(track, truth, scores.frame)
         if track is not None and xy is not None:
             here = xy[_true_floor(truth, track.t) == floor] + shift
             if len(here):
@@ -166,7 +159,7 @@ def _marks(ax: Axes, truth: Truth, floor: str, shift: Array) -> None:
 
 def _estimates(ax: Axes, scores: Scores, method: MethodScores, index: int, truth: Truth, floor: str) -> None:
     track = _track(method, truth.walk)
-    xy = None if track is None else _common_xy(scores, track, truth)
+    xy = None if track is None else places_in_frame(track, truth, scores.frame)
     if track is None or xy is None:
         return
     xy = xy + _shift(scores, floor)
