@@ -24,9 +24,9 @@ regression    8.5 / 24.1  5.9 / 16.2 (-2)
 ============ =========== ===================
 
 A regression on strengths alone (mean, peak, valley) reaches 7.7 / 21.9 at home and errs by -35 % there: how
-strongly a phone is shaken tells the person and the phone, step rate and wave shape tell the step. The features
-of the regression were chosen with both data sets in view, so the right column flatters it a little; its
-coefficients have seen ms-indoor only.
+strongly a phone is shaken tells the person and the phone, step rate and wave shape tell the step. The
+features of the regression were chosen with both data sets in view, so the right column flatters it a little;
+its coefficients have seen ms-indoor only.
 
 >>> model = StepLengthModel("weinberg", (0.4,))
 >>> step = StepFeatures(*(np.array([v]) for v in (0.5, 3.0, -2.0, 1.5, 4.0)))
