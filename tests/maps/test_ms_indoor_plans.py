@@ -182,6 +182,44 @@ def test_a_folder_without_floors_is_refused(tmp_path):
         import_site(tmp_path)
 
 
+def places_in(node, path=()):
+    """Paths to everything inside a JSON document."""
+    inside = node.items() if isinstance(node, dict) else enumerate(node) if isinstance(node, list) else ()
+    for key, value in inside:
+        yield (*path, key)
+        yield from places_in(value, (*path, key))
+
+
+ODD = [None, -1, 1e308, float("nan"), "x", [], {}, [[]], True, 1e9, [1, 2], [1, 2, 3]]
+
+
+@pytest.mark.parametrize("seed", range(120))
+def test_whatever_a_plan_holds_it_is_imported_or_refused_by_name(plans, seed):
+    rng = np.random.default_rng(seed)
+    path = plans / "F1" / "geojson_map.json"
+    document = json.loads(path.read_text())
+    for _ in range(rng.integers(1, 4)):
+        choices = list(places_in(document))
+        *way, key = choices[rng.integers(len(choices))]
+        node = document
+        for step in way:
+            node = node[step]
+        if rng.random() < 0.3:
+            del node[key]
+        else:
+            node[key] = json.loads(json.dumps(ODD[rng.integers(len(ODD))]))
+    path.write_text(json.dumps(document))
+    try:
+        floor, refusal = import_site(plans)[0].floors[1], None
+    except MapError as error:
+        floor, refusal = None, error
+    if floor is not None:
+        assert floor.area > 0
+    else:
+        assert refusal.where == str(path)
+        assert refusal.remedy
+
+
 def waypoints(folder):
     """(n, 2) m of every TYPE_WAYPOINT line below a floor's folder: a reader of the test's own."""
     pattern = re.compile(r"TYPE_WAYPOINT\t([-\d.]+)\t([-\d.]+)")

@@ -78,6 +78,7 @@ def edit(folder, change):
         (lambda f: edit(f, lambda m: m["floors"][0].update(files={})), "site.json"),
         (lambda f: edit(f, lambda m: m["floors"][0].update(files={"../B1.geojson": "0"})), "outside"),
         (lambda f: edit(f, lambda m: m["floors"][0].update(width="wide")), "site.json"),
+        (lambda f: edit(f, lambda m: m["floors"][0].update(level=float("inf"))), "site.json"),
         (lambda f: edit(f, lambda m: m["floors"][0].update(anchor={"origin": [1]})), "site.json"),
         (lambda f: edit(f, lambda m: m["floors"][1].update(name="B1")), "repeat"),
         (lambda f: (f / "F1.geojson").unlink(), "F1.geojson"),

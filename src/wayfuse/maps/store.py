@@ -103,7 +103,7 @@ def load_site(folder: Path) -> Site:
     try:
         floors = tuple(_floor(folder, entry) for entry in manifest["floors"])
         return Site(str(manifest["name"]), floors, dict(manifest.get("provenance", {})))
-    except (KeyError, TypeError, ValueError, AttributeError) as error:
+    except (KeyError, TypeError, ValueError, ArithmeticError, AttributeError) as error:
         raise MapError(f"damaged: {error!r}", where=folder / MANIFEST, remedy=ANEW) from error
 
 

@@ -231,16 +231,20 @@ def _plan(
     outline: list[Polygon] = []
     for rings in drawn:
         outline += _cleaned([frame.to_xy(ring) for ring in rings], "outline", notes)
+    if not outline:
+        raise MapError("the outline encloses no area", where=path, remedy="fetch the plan anew")
     units = [unit for i, feature in enumerate(features[1:], 1) for unit in _units(feature, i, frame, notes)]
     return tuple(outline), units, frame
 
 
 def _units(feature: Any, number: int, frame: _Frame, notes: _Notes) -> list[Unit]:
-    properties = (feature.get("properties") if isinstance(feature, dict) else None) or {}
-    ident = str(properties.get("id") or (feature.get("id") if isinstance(feature, dict) else None) or number)
+    table = feature if isinstance(feature, dict) else {}
+    held = table.get("properties")
+    properties = held if isinstance(held, dict) else {}
+    ident = str(properties.get("id") or table.get("id") or number)
     drawn = _polygons(feature)
     if not drawn:
-        notes.add(f"unit {ident}: not a polygon, left out")
+        notes.add(f"unit {ident}: no polygon with coordinates on the earth, left out")
     units = []
     for rings in drawn:
         for polygon in _cleaned([frame.to_xy(ring) for ring in rings], f"unit {ident}", notes):
@@ -271,22 +275,28 @@ def _category(properties: dict[str, Any]) -> str:
 
 
 def _polygons(feature: Any) -> list[list[Array]]:
-    """Rings in degrees of each polygon of a feature; empty where it is none."""
+    """Rings in degrees of each polygon of a feature; empty where it is none, or not a place on the earth."""
     try:
         geometry = feature["geometry"]
         parts = {"Polygon": [geometry["coordinates"]], "MultiPolygon": geometry["coordinates"]}[
             geometry["type"]
         ]
-        return [
-            [_degrees(np.array([p[:2] for p in ring], dtype=np.float64)) for ring in part] for part in parts
-        ]
+        rings = [[np.array([p[:2] for p in ring], dtype=np.float64) for ring in part] for part in parts]
     except (KeyError, TypeError, ValueError, IndexError):
         return []
+    sound = all(part and all(_on_earth(ring) for ring in part) for part in rings)
+    return [[_degrees(ring) for ring in part] for part in rings] if sound else []
+
+
+def _on_earth(ring: Array) -> bool:
+    """Whether a ring has points whose coordinates could be degrees or Web-Mercator metres."""
+    half = np.pi * SPHERE_RADIUS
+    return ring.ndim == 2 and ring.shape[1] == 2 and len(ring) > 0 and bool(np.all(np.abs(ring) <= half))
 
 
 def _degrees(points: Array) -> Array:
     """Degrees of coordinates that may be Web-Mercator metres (the plans declare them, but hold degrees)."""
-    if points.size == 0 or (np.abs(points[:, 0]).max() <= 180.0 and np.abs(points[:, 1]).max() <= 90.0):
+    if np.abs(points[:, 0]).max() <= 180.0 and np.abs(points[:, 1]).max() <= 90.0:
         return points
     lat = np.arctan(np.sinh(points[:, 1] / SPHERE_RADIUS))
     return np.asarray(np.rad2deg(np.column_stack([points[:, 0] / SPHERE_RADIUS, lat])))
