@@ -181,7 +181,7 @@ def _receive(url: str, part: Path, size: int, report: Progress) -> None:
     if have > size:
         part.unlink()
         have = 0
-    if have == size:
+    if have == size and part.exists():
         return
     request = urllib.request.Request(url, headers={"User-Agent": "wayfuse"})  # noqa: S310 (https, or a checked mirror)
     if have:

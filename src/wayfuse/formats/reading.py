@@ -38,6 +38,8 @@ def read(path: str | Path, *, format: str | None = None, platform: str | None = 
     if not path.exists():
         raise DataMissingError("no such file or folder", where=path)
     kind = format if format is not None else sniff(path)
+    if path.is_dir() and kind in {"ms-indoor", "getsensordata"}:
+        raise FormatError(f"a folder, where {kind} is a file", where=path)
     if kind == "ms-indoor":
         from wayfuse.formats import ms_indoor
 
