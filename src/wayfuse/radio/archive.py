@@ -4,7 +4,8 @@ A file is an uncompressed zip of ``.npy`` members; the member ``header.json`` sa
 the kind of content, free parameters, and of each array its dtype, shape and SHA-256. `read_archive` trusts
 none of it: it checks the declared sizes against the zip directory before it allocates, the checksums after,
 and refuses newer versions, other people's files and object arrays with an error that says what to do. What
-the arrays mean is the business of the caller, so other kinds of content can use the same container.
+the arrays mean is the business of the caller, so other kinds of content can use the same container. `save`
+and `load` are for fitted radio maps, `save_survey` and `load_survey` for surveys.
 """
 
 from __future__ import annotations
@@ -24,9 +25,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wayfuse.core.errors import RadioMapError
+from wayfuse.radio.radio_map import RadioMap
 from wayfuse.radio.survey import Survey
 
-__all__ = ["FORMAT", "load_survey", "read_archive", "save_survey", "write_archive"]
+__all__ = [
+    "FORMAT",
+    "load",
+    "load_survey",
+    "read_archive",
+    "save",
+    "save_survey",
+    "survey_from_parts",
+    "survey_parts",
+    "write_archive",
+]
 
 FORMAT = "wayfuse-archive"
 _FORMAT_VERSION = 1  # of the container; each kind of content has its own version besides
@@ -288,3 +300,50 @@ def _check_survey(
 
 def _within(index: NDArray[Any], n: int) -> bool:
     return bool(np.all((index >= 0) & (index < n)))
+
+
+_MAP_VERSION = 1
+
+
+def save(radio_map: RadioMap, path: str | os.PathLike[str]) -> None:
+    """Save a fitted radio map; `load` gives a map with the same answers."""
+    kind, header, arrays = radio_map.parts()
+    write_archive(path, kind, _MAP_VERSION, header, arrays)
+
+
+def load(path: str | os.PathLike[str]) -> RadioMap:
+    """Load a radio map of any kind; a damaged, foreign or newer file is a `RadioMapError`."""
+    kind, header, arrays = read_archive(path, version=_MAP_VERSION)
+    try:
+        return _rebuilt(kind, header, arrays, path)
+    except (KeyError, TypeError, ValueError, IndexError) as fault:
+        raise RadioMapError(
+            f"the parts of the {kind} map do not fit: {fault}", where=path, remedy=_AGAIN
+        ) from fault
+
+
+def _rebuilt(
+    kind: str, header: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]], path: str | os.PathLike[str]
+) -> RadioMap:
+    """The map of a kind from its parts; the modules of other kinds are not imported."""
+    if kind == "knn":
+        from wayfuse.radio.knn import KnnMap
+
+        return KnnMap.from_parts(survey_from_parts(header, arrays, path), header)
+    if kind == "nnss":
+        from wayfuse.radio.nnss import NnssMap
+
+        return NnssMap.from_parts(survey_from_parts(header, arrays, path), header)
+    if kind == "horus":
+        from wayfuse.radio.horus import HorusMap
+
+        return HorusMap.from_parts(header, arrays)
+    if kind == "gaussian_kernel":
+        from wayfuse.radio.gaussian_kernel import GaussianKernelMap
+
+        return GaussianKernelMap.from_parts(header, arrays)
+    if kind == "gaussian_process":
+        from wayfuse.radio.gaussian_process import GaussianProcessMap
+
+        return GaussianProcessMap.from_parts(header, arrays)
+    raise RadioMapError(f"holds {kind!r}, not a radio map", where=path, remedy="give a radio map file")
