@@ -279,7 +279,7 @@ def scan_ms_indoor(
                 kind = _kind_at(word, i + 14)
         good = False
         if 0 <= kind < _WIFI:
-            stop = _motion(buf, i + 14 + _LENGTH[kind], values[kind, counts[kind]])
+            stop = _motion(buf, i + 14 + _LENGTH[kind], values[counts[kind], kind])
             good = stop >= 0
             i = stop if good else i
         if not good:
@@ -304,7 +304,7 @@ def scan_ms_indoor(
                 good = n_tabs == (3 if kind == _BLU4 else 7) and n_letters == 0
             elif kind >= _WIFI and (kind == _WIFI or n_letters == 0):  # a name may hold Y, and TYPE_ does
                 row = counts[kind]
-                first, last = _radio(buf, word, kind, i, n_tabs, values[kind, row])
+                first, last = _radio(buf, word, kind, i, n_tabs, values[row, kind])
                 good = last > first and (word[first] & _FIVE) != _TYPE
                 if good:
                     identifier = _address(buf, first) if last - first == 17 else _U(1) << _U(63)
@@ -312,12 +312,12 @@ def scan_ms_indoor(
                         token[n_token, 0], token[n_token, 1] = kind, row
                         token[n_token, 2], token[n_token, 3] = first, last
                         n_token += 1
-                    ids[kind, row] = identifier
+                    ids[row, kind] = identifier
         if good:
             row = counts[kind]
             if kind < _UNCALIBRATED:
-                line[kind, row] = number
-                t[kind, row] = ms / 1000.0
+                line[row, kind] = number
+                t[row, kind] = ms / 1000.0
             counts[kind] = row + 1
         elif i > start:
             care[n_care, 0], care[n_care, 1], care[n_care, 2] = number, start, i

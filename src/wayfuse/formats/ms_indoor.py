@@ -35,7 +35,7 @@ from wayfuse.sensors.records import Waypoint, bssid_id
 
 __all__ = ["blocks", "read"]
 
-BLOCK_BYTES = 1 << 20
+BLOCK_BYTES = 1 << 19  # the scanner's arrays then stay below the size that gets huge pages, slow to touch
 _PADDING = 64  # zeros behind a block: the scanner looks ahead without asking where the block ends
 _SHORTEST_RECORD = 24  # bytes: time, tab, TYPE_BLUE, three tabs
 _FIRST_RADIO = 4  # index into _COLUMNS
@@ -122,9 +122,9 @@ class _Scanner:
 
     def _allocate(self, size: int) -> None:
         m = size // _SHORTEST_RECORD + 1
-        self._line, self._t = np.empty((7, m), np.int64), np.empty((7, m))
-        self._ids, self._values = np.empty((7, m), np.uint64), np.empty((7, m, 3))
-        self._token, self._care = np.empty((m, 4), np.int64), np.empty((size // 2 + 1, 3), np.int64)
+        self._line, self._t = np.empty((m, 7), np.int64), np.empty((m, 7))
+        self._ids, self._values = np.empty((m, 7), np.uint64), np.empty((m, 7, 3))
+        self._token, self._care = np.empty((m, 4), np.int64), np.empty((size // 2 + 1, 3), np.int32)
         self._size = size
 
     def scan(self, buffer: bytearray, n: int) -> Piece:
@@ -169,14 +169,14 @@ class _Scanner:
             text = bytes(buffer[start:stop])
             if text not in self._known:
                 self._known[text] = _identifier(text)
-            self._ids[kind, row] = self._known[text]
+            self._ids[row, kind] = self._known[text]
 
     def _column(self, row: int, n: int) -> Column:
         return Column(
-            self._line[row, :n] + self._report.n_lines,
-            self._t[row, :n].copy(),
-            _shaped(_COLUMNS[row], self._values[row, :n]),
-            self._ids[row, : n if row >= _FIRST_RADIO else 0].copy(),
+            self._line[:n, row] + self._report.n_lines,
+            self._t[:n, row].copy(),
+            _shaped(_COLUMNS[row], self._values[:n, row]),
+            self._ids[: n if row >= _FIRST_RADIO else 0, row].copy(),
         )
 
 
@@ -210,7 +210,8 @@ class _Careful:
         """Read one line without its line end."""
         line = line.removesuffix(b"\r")
         if line.startswith(b"#"):
-            self._read_header(line)
+            if not line.startswith(b"#\ttype:"):  # the data sheets of the sensors
+                self._read_header(line)
             return
         if not line.strip():
             return
