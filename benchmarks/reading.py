@@ -1,7 +1,7 @@
 """Reading ms-indoor logs: the compiled reader against a plain Python line loop that does the same job.
 
 Both return a whole `Recording`: motion sensors, orientation, Wi-Fi grouped into scans without exact repeats,
-Bluetooth with tx power, waypoints, header. The two are interleaved over several real files, so that a busy
+Bluetooth with tx power, waypoints, header. The two take turns over several real files, so that a busy
 machine slows both; minima and medians are compared. Run ``python -m benchmarks.reading [FOLDER] [--files N]
 [--rounds N]``.
 """
@@ -114,15 +114,15 @@ READERS: dict[str, Callable[[Path], Recording]] = {"plain loop": plain_read, "wa
 
 
 def measure(paths: list[Path], rounds: int) -> dict[str, list[list[float]]]:
-    """Seconds per reader, file and round, the readers taking turns."""
+    """Seconds per reader, file and round; in each round one reader reads all files, then the other."""
     times: dict[str, list[list[float]]] = {name: [[] for _ in paths] for name in READERS}
     for path in paths:
         for reader in READERS.values():
             reader(path)  # compiled, and the file in the page cache
     for _ in range(rounds):
-        for k, path in enumerate(paths):
-            for name, reader in READERS.items():
-                gc.collect()
+        for name, reader in READERS.items():
+            gc.collect()
+            for k, path in enumerate(paths):
                 start = time.perf_counter()
                 reader(path)
                 times[name][k].append(time.perf_counter() - start)
