@@ -160,7 +160,8 @@ def _without_repeats(column: Column, report: ReadReport) -> Column:
         return column
     table = np.full(1 << (2 * n - 1).bit_length(), -1, np.int64)
     repeat = np.empty(n, np.bool_)
-    mark_repeats(column.t, column.ids, column.values, table, repeat)
+    with np.errstate(over="ignore"):  # the hash wraps around, which only uncompiled code mentions
+        mark_repeats(column.t, column.ids, column.values, table, repeat)
     if not repeat.any():
         return column
     count_lines(report, "wifi: exact repeat of a reading", column.line[repeat])

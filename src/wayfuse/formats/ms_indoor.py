@@ -137,9 +137,10 @@ class _Scanner:
         buf = np.frombuffer(buffer, np.uint8)
         word = np.ndarray((n + _PADDING - 8,), "<u8", buf, strides=(1,))
         counts = np.zeros(13, np.int64)
-        n_lines = scan_ms_indoor(
-            buf, word, n, self._line, self._t, self._values, self._ids, self._token, self._care, counts
-        )
+        with np.errstate(over="ignore"):  # sums of bytes wrap around, which only uncompiled code mentions
+            n_lines = scan_ms_indoor(
+                buf, word, n, self._line, self._t, self._values, self._ids, self._token, self._care, counts
+            )
         self._name_tokens(buffer, int(counts[11]))
         careful = _Careful(report, self._floor)
         for number, start, stop in self._care[: counts[12]].tolist():
