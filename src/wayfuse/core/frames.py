@@ -42,7 +42,9 @@ class GeoAnchor:
     def __post_init__(self) -> None:
         m = self.matrix
         if abs(m[0][0] * m[1][1] - m[0][1] * m[1][0]) < 1e-16:
-            raise MapError("the geographic anchor is singular", remedy="give control points that span an area")
+            raise MapError(
+                "the geographic anchor is singular", remedy="give control points that span an area"
+            )
 
     @classmethod
     def from_origin(cls, lon: float, lat: float, rotation: float = 0.0, scale: float = 1.0) -> GeoAnchor:

@@ -116,10 +116,11 @@ def from_track(
     method: str,
     estimates: Sequence[Estimate],
     floors: Sequence[str],
-    anchor: GeoAnchor | None = None,
+    anchors: Sequence[GeoAnchor | None] = (),
     survey_distance: Array | None = None,
 ) -> WalkEstimates:
-    """Rows of a tracker's estimates; ``floors`` names the floor indices, ``anchor`` fills lat and lon.
+    """Rows of a tracker's estimates; ``floors`` names the floor indices, ``anchors`` (one per floor) fill lat and
+    lon.
 
     Of estimates at the same time the last one is kept: it is what the tracker knew then.
     """
@@ -140,10 +141,19 @@ def from_track(
         t=np.array([e.t for e in kept], dtype=np.float64),
         xy=xy,
         floor=np.array([floors[e.floor] for e in kept], dtype=np.str_),
-        lonlat=np.full_like(xy, np.nan) if anchor is None else anchor.to_lonlat(xy),
+        lonlat=_lonlat(xy, [e.floor for e in kept], anchors),
         numbers=arrays,
         state=np.array([e.state.value for e in kept], dtype=np.str_),
     )
+
+
+def _lonlat(xy: Array, floor: list[int], anchors: Sequence[GeoAnchor | None]) -> Array:
+    out = np.full_like(xy, np.nan)
+    index = np.asarray(floor, dtype=np.int64)
+    for f, anchor in enumerate(anchors):
+        if anchor is not None:
+            out[index == f] = anchor.to_lonlat(xy[index == f])
+    return out
 
 
 # --- writing ------------------------------------------------------------------------------------------------

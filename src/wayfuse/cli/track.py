@@ -1,0 +1,272 @@
+"""``wayfuse track``: recordings in, EST.csv out."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+if TYPE_CHECKING:
+    from collections import Counter
+
+    from wayfuse.evaluation.estimates_file import WalkEstimates
+    from wayfuse.maps.site import Site
+    from wayfuse.models.observation.coverage import SurveyDistance
+    from wayfuse.radio.survey import Survey
+    from wayfuse.sensors.quality import Verdict
+    from wayfuse.sensors.recording import Recording
+
+__all__ = ["METHODS", "track"]
+
+# name -> what it is; built in `_tracker`
+METHODS = {
+    "fused": "steps, Wi-Fi and floor plan in a particle filter",
+    "fused-no-map": "fused without the floor plan",
+    "fused-no-steps": "fused without steps",
+    "fused-2.4ghz": "fused with the 2.4 GHz band alone",
+    "fused-5ghz": "fused with the 5 GHz band alone",
+    "random-walk": "particle filter without motion sensors, tuned for itself",
+    "wknn": "weighted k nearest neighbours, scan by scan",
+    "nnss": "nearest neighbour in signal space, scan by scan",
+    "pdr": "steps from a known start (--start)",
+}
+
+
+@click.command(context_settings={"help_option_names": ["-h", "--help"]})
+@click.argument("site_folder", metavar="SITE", type=click.Path(path_type=Path))
+@click.argument("recordings", metavar="RECORDING...", nargs=-1, required=True)
+@click.option(
+    "--radio-map", type=click.Path(path_type=Path), required=True, help="From `wayfuse survey build`."
+)
+@click.option(
+    "--method",
+    "methods",
+    multiple=True,
+    type=click.Choice(list(METHODS)),
+    default=["fused"],
+    show_default=True,
+    help="May be repeated; the rows of EST.csv name their method.",
+)
+@click.option("--seed", type=int, default=0, show_default=True, help="Equal seeds give equal bits.")
+@click.option(
+    "--lag", type=click.FloatRange(0.0, 60.0), default=0.0, help="Seconds an estimate may come later."
+)
+@click.option("--particles", type=click.IntRange(10, 1_000_000), default=1000, show_default=True)
+@click.option("--start", help="For pdr: X,Y,FLOOR, or `waypoint` for the first waypoint of each recording.")
+@click.option("--jobs", type=click.IntRange(1), help="Processes (default: all cores).")
+@click.option("--out", type=click.Path(path_type=Path), required=True, help="EST.csv to write.")
+def track(
+    site_folder: Path,
+    recordings: tuple[str, ...],
+    radio_map: Path,
+    methods: tuple[str, ...],
+    seed: int,
+    lag: float,
+    particles: int,
+    start: str | None,
+    jobs: int | None,
+    out: Path,
+) -> None:
+    """Track recordings through SITE and write EST.csv.
+
+    RECORDING is a file, a folder, or @FILE with a path per line. Waypoints and floor labels in the recordings are not
+    used (except by `pdr --start waypoint`, which says so).
+
+    EST.csv has one row per scan and at least one a second: walk, t_ms (in the recording's own clock), x, y (metres of
+    the floor's plan), floor, lat, lon, and more. With --lag L a row's position uses records up to t_ms + L seconds.
+    """
+    from wayfuse import __version__
+    from wayfuse.cli.work import check_target, map_recordings, report_faults
+    from wayfuse.evaluation.estimates_file import Sidecar, open_writer
+    from wayfuse.formats.reading import expand
+
+    check_target(out)
+    methods = tuple(dict.fromkeys(methods))
+    paths = expand(recordings)
+    worker = _Worker(site_folder, radio_map, methods, seed, lag, particles, start)
+    worker.prepare()  # errors of use appear here, once, before any process starts
+    parameters: dict[str, Any] = {"methods": list(methods), "particles": particles, "start": start or ""}
+    sidecar = Sidecar(
+        site=str(site_folder.resolve()),
+        radio_map=str(radio_map.resolve()),
+        seed=seed,
+        lag=lag,
+        parameters=parameters,
+        version=__version__,
+    )
+    notes: list[str] = []
+    rows = failed = 0
+    totals: Counter[Verdict] | None = None
+    with open_writer(out, sidecar) as writer:
+        for result in map_recordings(worker, paths, "tracking", jobs):
+            notes += result.notes
+            failed += not result.ok
+            totals = result.verdicts if totals is None else totals + result.verdicts
+            for estimates in result.estimates:
+                rows += writer.add(estimates)
+    report_faults(notes)
+    click.echo(
+        f"{len(paths) - failed} of {len(paths)} recordings tracked by {', '.join(methods)}; {rows} rows: {out}"
+    )
+    if totals:
+        said = ", ".join(
+            f"{count} {verdict.value}" for verdict, count in sorted(totals.items(), key=lambda i: i[0].value)
+        )
+        click.echo(f"scans: {said}")
+    if failed:
+        raise click.exceptions.Exit(1)
+
+
+class _Result:
+    """What became of one recording."""
+
+    def __init__(self, *, ok: bool) -> None:
+        from collections import Counter
+
+        self.ok = ok
+        self.notes: list[str] = []
+        self.estimates: list[WalkEstimates] = []
+        self.verdicts: Counter[Verdict] = Counter()
+
+
+class _Worker:
+    """Tracks one recording with every method; sent to each process, which loads site and radio map once."""
+
+    def __init__(
+        self,
+        site: Path,
+        radio_map: Path,
+        methods: tuple[str, ...],
+        seed: int,
+        lag: float,
+        particles: int,
+        start: str | None,
+    ) -> None:
+        self.paths = site, radio_map
+        self.methods, self.seed, self.lag, self.particles, self.start = methods, seed, lag, particles, start
+        self.loaded: tuple[Site, SurveyDistance, dict[str, Any]] | None = None
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Everything but what each process loads itself."""
+        return {**self.__dict__, "loaded": None}
+
+    def prepare(self) -> tuple[Site, SurveyDistance, dict[str, Any]]:
+        """Load site and radio map and build the trackers, once per process."""
+        if self.loaded is None:
+            from wayfuse.maps.site import Site
+            from wayfuse.models.observation.coverage import SurveyDistance
+            from wayfuse.radio.walk_survey import load
+
+            site = Site.load(self.paths[0])
+            survey = load(self.paths[1]).survey
+            if "pdr" in self.methods:
+                _check_start(self.start, site)
+            trackers = {name: self._tracker(name, site, survey) for name in self.methods if name != "pdr"}
+            self.loaded = site, SurveyDistance.build(survey), trackers
+        return self.loaded
+
+    def __call__(self, path: Path) -> _Result:
+        """Read and track."""
+        from wayfuse.core.errors import WayfuseError
+        from wayfuse.formats.reading import read
+
+        try:
+            recording = read(path)
+        except WayfuseError as error:
+            failed = _Result(ok=False)
+            failed.notes.append(str(error))
+            return failed
+        return self._track(recording)
+
+    def _track(self, recording: Recording) -> _Result:
+        import numpy as np
+
+        from wayfuse.evaluation.estimates_file import from_track
+
+        site, distance, trackers = self.prepare()
+        result = _Result(ok=True)
+        result.notes += [*recording.report.describe(), *_lacks(recording)]
+        for name in self.methods:
+            tracker = trackers[name] if name != "pdr" else self._dead_reckoning(site, recording, result)
+            if tracker is None:
+                continue
+            done = tracker.run(recording, self.seed)
+            e = done.estimates
+            columns = np.array([(r.x, r.y, r.floor) for r in e]).reshape(-1, 3)
+            away = distance.at(columns[:, 0], columns[:, 1], columns[:, 2].astype(np.int64))
+            anchors = [floor.anchor for floor in site.floors]
+            result.estimates.append(from_track(recording.name, name, e, site.floor_names, anchors, away))
+            if name == self.methods[0]:
+                result.verdicts = done.verdicts
+        return result
+
+    def _tracker(self, name: str, site: Site, survey: Survey) -> Any:
+        from dataclasses import replace
+
+        from wayfuse.presets import baselines, fused
+
+        config = fused.Config(n_particles=self.particles)
+        if name in {"nnss", "wknn"}:
+            return getattr(baselines, name)(site, survey, lag=self.lag)
+        if name == "random-walk":
+            return fused.build(
+                site, survey, replace(baselines.RANDOM_WALK, n_particles=self.particles), lag=self.lag
+            )
+        changed = {
+            "fused": config,
+            "fused-no-map": fused.without(config, "map"),
+            "fused-no-steps": fused.without(config, "steps"),
+            "fused-2.4ghz": fused.without(config, "5"),
+            "fused-5ghz": fused.without(config, "2.4"),
+        }
+        return fused.build(site, survey, changed[name], lag=self.lag)
+
+    def _dead_reckoning(self, site: Site, recording: Recording, result: _Result) -> Any:
+        from wayfuse.core.errors import MapError
+        from wayfuse.models.survey_walk import place_of
+        from wayfuse.presets.baselines import dead_reckoning
+        from wayfuse.tracking.dead_reckoning import Start
+
+        if self.start != "waypoint":
+            return dead_reckoning(site, _check_start(self.start, site), lag=self.lag)
+        try:
+            place = place_of(site, recording.waypoints[0])
+        except (IndexError, MapError) as error:
+            why = "no waypoint" if isinstance(error, IndexError) else str(error)
+            result.notes.append(f"{recording.path}: {why}: pdr has no start, not tracked")
+            return None
+        return dead_reckoning(site, Start(*place), lag=self.lag)
+
+
+def _check_start(start: str | None, site: Site) -> Any:
+    """A start of the command line: ``waypoint`` gives None."""
+    from wayfuse.core.errors import UsageError
+    from wayfuse.tracking.dead_reckoning import Start
+
+    if start == "waypoint":
+        return None
+    parts = (start or "").split(",")
+    try:
+        x, y = float(parts[0]), float(parts[1])
+        name = parts[2].strip()
+    except (IndexError, ValueError):
+        raise UsageError(
+            "method pdr needs a start" if not start else f"'{start}' is not a start",
+            where="--start",
+            remedy="give X,Y,FLOOR in metres of the plan, or waypoint",
+        ) from None
+    return Start(x, y, site.floor_index(name))
+
+
+def _lacks(recording: Recording) -> list[str]:
+    """What a recording lacks for tracking, a line each."""
+    where = recording.path or recording.name
+    if recording.is_empty:
+        return [f"{where}: empty: no estimate"]
+    out = []
+    if not recording.wifi:
+        out.append(f"{where}: no Wi-Fi scan: the position stays unknown (state initialising)")
+    if not len(recording.acceleration):
+        out.append(f"{where}: no accelerometer: no steps, the position diffuses between scans")
+    return out

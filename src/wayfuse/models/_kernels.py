@@ -1,0 +1,122 @@
+"""Compiled loops that join one domain (steps, radio, maps) to the particles."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wayfuse.core.jit import fast_kernel, kernel
+from wayfuse.core.types import Array, Array32
+
+__all__ = ["block_on_mask", "mixture_log_likelihood", "pdr_move"]
+
+
+@kernel
+def pdr_move(
+    z: Array32,
+    x: Array32,
+    y: Array32,
+    bias: Array32,
+    scale: Array32,
+    length: float,
+    heading: float,
+    length_sigma: float,
+    heading_sigma: float,
+    bias_sigma: float,
+    scale_sigma: float,
+    new_x: Array32,
+    new_y: Array32,
+    new_bias: Array32,
+    new_scale: Array32,
+) -> None:
+    """Move every particle by one step; ``z`` (4, N) standard normals: length, heading, bias, scale."""
+    for i in range(x.shape[0]):
+        b = bias[i] + bias_sigma * z[2, i]
+        s = scale[i] + scale_sigma * z[3, i]
+        s = max(s, 0.4)
+        d = length * s * (1.0 + length_sigma * z[0, i])
+        h = heading + b + heading_sigma * z[1, i]
+        new_x[i] = x[i] + d * math.cos(h)
+        new_y[i] = y[i] + d * math.sin(h)
+        new_bias[i] = b
+        new_scale[i] = s
+
+
+@kernel
+def block_on_mask(
+    x: Array32,
+    y: Array32,
+    new_x: Array32,
+    new_y: Array32,
+    floor: NDArray[np.int32],
+    mask: NDArray[np.uint8],
+    start: NDArray[np.int64],
+    nx: NDArray[np.int64],
+    ny: NDArray[np.int64],
+    x0: Array,
+    y0: Array,
+    cell: float,
+    penalty: float,
+    log_weights: Array,
+) -> int:
+    """Stop particles whose step leaves walkable space: they stay, and lose ``penalty`` in log-weight.
+
+    The middle and the end of the step are looked up; a particle already outside may go anywhere, at the same
+    penalty, so that a cloud that starts on a blocked cell can leave it. Returns how many were stopped.
+    """
+    blocked = 0
+    for i in range(x.shape[0]):
+        f = floor[i]
+        ok = True
+        for half in range(2):
+            if half == 0:
+                px = np.float64(new_x[i])
+                py = np.float64(new_y[i])
+            else:
+                px = 0.5 * (np.float64(new_x[i]) + np.float64(x[i]))
+                py = 0.5 * (np.float64(new_y[i]) + np.float64(y[i]))
+            cx = math.floor((px - x0[f]) / cell)
+            cy = math.floor((py - y0[f]) / cell)
+            if cx < 0 or cy < 0 or cx >= nx[f] or cy >= ny[f] or mask[start[f] + cy * nx[f] + cx] == 0:
+                ok = False
+                break
+        if not ok:
+            blocked += 1
+            log_weights[i] -= penalty
+            cx = math.floor((np.float64(x[i]) - x0[f]) / cell)
+            cy = math.floor((np.float64(y[i]) - y0[f]) / cell)
+            inside = cx >= 0 and cy >= 0 and cx < nx[f] and cy < ny[f]
+            if inside and mask[start[f] + cy * nx[f] + cx] != 0:
+                new_x[i] = x[i]
+                new_y[i] = y[i]
+    return blocked
+
+
+@fast_kernel
+def mixture_log_likelihood(
+    x: Array32,
+    y: Array32,
+    floor: NDArray[np.int32],
+    place_x: Array32,
+    place_y: Array32,
+    place_floor: NDArray[np.int32],
+    weight: Array32,
+    sigma: float,
+    background: float,
+    exponent: float,
+    out: Array,
+) -> None:
+    """Add exponent * log(sum_j w_j exp(-r_ij² / 2 sigma²) + background) over places j on the particle's floor."""
+    half = np.float32(-0.5 / (sigma * sigma))
+    for i in range(x.shape[0]):
+        total = np.float32(background)
+        for j in range(place_x.shape[0]):
+            if place_floor[j] == floor[i]:
+                dx = x[i] - place_x[j]
+                dy = y[i] - place_y[j]
+                e = half * (dx * dx + dy * dy)
+                if e > np.float32(-20.0):
+                    total += weight[j] * math.exp(e)
+        out[i] += exponent * math.log(total)

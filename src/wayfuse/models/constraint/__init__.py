@@ -1,0 +1,1 @@
+"""Constraints: which moves a building allows."""

@@ -1,0 +1,1 @@
+"""Motion models: how a cloud moves."""

@@ -1,0 +1,1 @@
+"""Observation models: how likely an observation is at each particle."""

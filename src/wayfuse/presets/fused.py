@@ -1,0 +1,154 @@
+"""``fused``: Wi-Fi fingerprints, steps and the floor plan in one particle filter; and its parts as baselines.
+
+Every number was chosen on three development folds of ms-indoor site1 (h == 1, 2, 3; survey = all other walks),
+pooled; `wayfuse results` prints what each part is worth there. Source papers: he2014 (steps and radio map in a
+particle filter), chu2009 (floor plan as constraint), li2015 (step length per particle).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from wayfuse.core.errors import RadioMapError
+from wayfuse.filters.particle_filter import ParticleFilter
+from wayfuse.filters.resampling import resampler
+from wayfuse.maps.site import Site
+from wayfuse.models.constraint.barriers import Barriers
+from wayfuse.models.initial import FirstCloud
+from wayfuse.models.motion.pdr import PdrMotion
+from wayfuse.models.motion.random_walk import RandomWalk
+from wayfuse.models.observation.coverage import SurveyDistance
+from wayfuse.models.observation.fingerprint import FingerprintLikelihood
+from wayfuse.radio.sparse_knn import SparseKnn
+from wayfuse.radio.survey import Survey
+from wayfuse.tracking.estimate import Estimate, State
+from wayfuse.tracking.particle_engine import ParticleEngine, ParticleState, Recovery
+from wayfuse.tracking.summary import Summary
+from wayfuse.tracking.tracker import Tracker
+
+__all__ = ["BAND_2_4", "BAND_5", "Config", "build", "check_floors", "prior_estimate"]
+
+BAND_2_4 = ((2400, 2500),)  # MHz
+BAND_5 = ((4900, 5925),)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Config:
+    """Parameters of ``fused``."""
+
+    n_particles: int = 1000
+    resampling: str = "systematic"
+    k: int = 40  # neighbours of a scan
+    temperature: float = 0.02  # of the neighbours' weights, in signal distance
+    bands: tuple[tuple[int, int], ...] = ()  # MHz; empty = both
+    sigma: float = 4.0  # m, kernel at a neighbour
+    background: float = 0.08
+    exponent: float = 0.45  # tempering: errors of successive scans are much alike
+    coverage_gain: float = 1.5  # nats
+    length_sigma: float = 0.15  # relative, per step
+    heading_sigma: float = 0.06  # rad, per step
+    bias_sigma: float = 0.015  # rad, per step
+    scale_sigma: float = 0.006  # per step
+    first_bias_sigma: float = 0.2  # rad; rotation vector against truth: 0.17 between walks
+    first_scale_sigma: float = 0.09  # per-walk mean step against the model
+    injection: float = 0.005  # share of particles per scan
+    penalty: float = 1.2  # nats per blocked move
+    diffusion: float = 1.2  # m per root second, where motion sensors are silent
+    use_map: bool = True
+    use_steps: bool = True
+    summary: Summary = field(default_factory=Summary)
+
+
+def build(
+    site: Site, survey: Survey, config: Config | None = None, *, lag: float = 0.0
+) -> Tracker[ParticleState]:
+    """The tracker of a site and a survey of it.
+
+    Raises
+    ------
+    RadioMapError : the survey is of another site.
+    """
+    c = config or Config()
+    check_floors(site, survey)
+    observation = FingerprintLikelihood(
+        sigma=c.sigma,
+        background=c.background,
+        exponent=c.exponent,
+        coverage=SurveyDistance.build(survey) if c.coverage_gain > 0.0 else None,
+        coverage_gain=c.coverage_gain,
+    )
+    first = FirstCloud(
+        observation=observation,
+        walkable=tuple(floor.walkable for floor in site.floors) if c.use_map else (),
+        bias_sigma=c.first_bias_sigma,
+        scale_sigma=c.first_scale_sigma,
+    )
+    engine = ParticleEngine(
+        radio_map=SparseKnn(survey, k=c.k, temperature=c.temperature, bands=c.bands),
+        observation=observation,
+        first=first,
+        prior=prior_estimate(site),
+        motion=PdrMotion(
+            length_sigma=c.length_sigma,
+            heading_sigma=c.heading_sigma,
+            bias_sigma=c.bias_sigma,
+            scale_sigma=c.scale_sigma,
+        ),
+        diffusion=RandomWalk(c.diffusion),
+        constraint=Barriers(tuple(f.barrier_index for f in site.floors), c.penalty) if c.use_map else None,
+        filter=ParticleFilter(resampler(c.resampling)),
+        recovery=Recovery(injection=c.injection),
+        summary=c.summary,
+        n_particles=c.n_particles,
+        uses_steps=c.use_steps,
+        rotation=site.anchor.rotation if site.anchor is not None else 0.0,
+    )
+    return Tracker(engine=engine, lag=lag)
+
+
+def check_floors(site: Site, survey: Survey) -> None:
+    """Refuse a survey whose floors are not the site's."""
+    if survey.floors != site.floor_names:
+        raise RadioMapError(
+            f"the radio map has floors {', '.join(survey.floors)}, site {site.name} has {', '.join(site.floor_names)}",
+            remedy="build the radio map with this site",
+        )
+
+
+def prior_estimate(site: Site) -> Estimate:
+    """What is known before the first scan: somewhere on a floor, most likely the one with most walkable space.
+
+    The radii hold 68 and 95 % of the walkable places of that floor.
+    """
+    floor = int(np.argmax([f.walkable.area for f in site.floors]))
+    places = site.floors[floor].walkable.centres()
+    if not len(places):
+        places = np.array([[site.floors[floor].width / 2, site.floors[floor].height / 2]])
+    x, y = places.mean(axis=0)
+    cov = np.cov(places.T) if len(places) > 1 else np.zeros((2, 2))
+    r68, r95 = np.quantile(np.hypot(places[:, 0] - x, places[:, 1] - y), (0.68, 0.95))
+    return Estimate(
+        0.0,
+        float(x),
+        float(y),
+        floor,
+        float(cov[0, 0]),
+        float(cov[0, 1]),
+        float(cov[1, 1]),
+        float(r68),
+        float(r95),
+        State.INITIALISING,
+    )
+
+
+def without(config: Config, part: str) -> Config:
+    """The configuration without one of its parts: ``map``, ``steps``, ``2.4`` or ``5`` (GHz)."""
+    changes = {
+        "map": replace(config, use_map=False),
+        "steps": replace(config, use_steps=False),
+        "2.4": replace(config, bands=BAND_5),
+        "5": replace(config, bands=BAND_2_4),
+    }
+    return changes[part]

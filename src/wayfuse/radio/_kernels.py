@@ -1,0 +1,54 @@
+"""Compiled loops of the sparse k-NN map."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wayfuse.core.jit import fast_kernel, kernel
+from wayfuse.core.types import Array32
+
+__all__ = ["accumulate_overlap", "nearest"]
+
+
+@fast_kernel
+def accumulate_overlap(
+    columns: NDArray[np.int64],
+    values: Array32,
+    weights: Array32,
+    start: NDArray[np.int64],
+    rows: NDArray[np.int32],
+    row_values: Array32,
+    out: Array32,
+) -> None:
+    """Add w_a min(v_a, v_ra) over the query's access points a to ``out[r]`` of every row r that heard a.
+
+    ``start``, ``rows``, ``row_values`` are the inverted index: for access point a the rows that heard it.
+    """
+    for q in range(columns.shape[0]):
+        a = columns[q]
+        v = values[q]
+        w = weights[q]
+        for k in range(start[a], start[a + 1]):
+            u = row_values[k]
+            out[rows[k]] += w * (u if u < v else v)
+
+
+@kernel
+def nearest(distance: Array32, k: int, index: NDArray[np.int32], best: Array32) -> int:
+    """Write the k smallest distances, ascending, and their rows; ties keep the lower row. Returns how many."""
+    n = 0
+    for i in range(distance.shape[0]):
+        d = distance[i]
+        if n == k and d >= best[n - 1]:
+            continue
+        j = n if n < k else k - 1
+        while j > 0 and best[j - 1] > d:
+            best[j] = best[j - 1]
+            index[j] = index[j - 1]
+            j -= 1
+        best[j] = d
+        index[j] = i
+        if n < k:
+            n += 1
+    return n

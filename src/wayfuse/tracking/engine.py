@@ -1,0 +1,72 @@
+"""What a positioning method has to offer to be tracked with: the seam between `Tracker` and the methods."""
+
+from __future__ import annotations
+
+from typing import NamedTuple, Protocol, TypeVar
+
+from wayfuse.inertial.front_end import StepEvent
+from wayfuse.radio.survey import Fingerprint
+from wayfuse.tracking.estimate import Estimate, State
+
+__all__ = ["Engine", "Why", "unknown"]
+
+S = TypeVar("S")
+
+
+class Why(NamedTuple):
+    """What went into an estimate since the one before."""
+
+    n_steps: int = 0
+    n_aps: int = 0
+    share_blocked: float = 0.0
+
+
+class Engine(Protocol[S]):
+    """A positioning method as pure functions of its own state ``S``.
+
+    ``uses_steps`` tells whether it moves on steps (else it diffuses with time); ``supports_lag`` whether it can say
+    later where it was.
+    """
+
+    @property
+    def uses_steps(self) -> bool:
+        """Whether steps move it."""
+        ...
+
+    @property
+    def supports_lag(self) -> bool:
+        """Whether `mark` and `recall` work."""
+        ...
+
+    def init(self, track: str, seed: int) -> S:
+        """State before the first record."""
+        ...
+
+    def on_step(self, state: S, event: StepEvent, *, heading_known: bool) -> S:
+        """A step was made."""
+        ...
+
+    def on_quiet(self, state: S, dt: float) -> S:
+        """``dt`` seconds passed without motion sensors."""
+        ...
+
+    def on_fingerprint(self, state: S, t: float, fingerprint: Fingerprint, *, heading_known: bool) -> S:
+        """A scan was delivered."""
+        ...
+
+    def estimate(self, state: S, t: float) -> tuple[S, Estimate]:
+        """Where now? The counts of `Why` start anew."""
+        ...
+
+    def mark(self, state: S, t: float) -> S:
+        """Remember this moment for `recall`."""
+        ...
+
+    def recall(self, state: S) -> tuple[S, Estimate]:
+        """Where at the oldest remembered moment, by all that is known now; forgets it."""
+        ...
+
+
+def unknown(t: float, prior: Estimate) -> Estimate:
+    """The estimate of somebody who knows nothing but the building."""
+    return prior._replace(t=t, state=State.INITIALISING)

@@ -1,0 +1,209 @@
+"""The particle filter as a positioning method: fused, without map, without steps, by its parts."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+
+from wayfuse.core.errors import ConfigError
+from wayfuse.core.philox import Noise, track_key
+from wayfuse.filters.particle_filter import (
+    Constraint,
+    FilterState,
+    ParticleFilter,
+    Snapshot,
+    replace_particles,
+)
+from wayfuse.inertial.front_end import StepEvent
+from wayfuse.models.initial import FirstCloud
+from wayfuse.models.motion.pdr import PdrMotion, StepInput
+from wayfuse.models.motion.random_walk import RandomWalk
+from wayfuse.models.observation.fingerprint import FingerprintLikelihood
+from wayfuse.radio.sparse_knn import Neighbours, SparseKnn
+from wayfuse.radio.survey import Fingerprint
+from wayfuse.tracking.engine import Why, unknown
+from wayfuse.tracking.estimate import Estimate, State
+from wayfuse.tracking.summary import Summary, summarise
+
+__all__ = ["ParticleEngine", "ParticleState", "Recovery"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Recovery:
+    """When a track is settled, lost, and what is done about it.
+
+    injection : share of particles drawn afresh at each scan. agreement : a scan contradicts the cloud when the cloud's
+    mean likelihood is below this share of what the scan's own neighbours have. patience : scans in a row until the
+    track is lost and ``reset_share`` of the particles are drawn afresh. settled : m, r95 below which a track is no
+    longer initialising. lost : m, r95 above which a settled track is lost.
+    """
+
+    injection: float = 0.003
+    agreement: float = 0.02
+    patience: int = 3
+    reset_share: float = 0.5
+    settled: float = 25.0
+    lost: float = 60.0
+
+    def __post_init__(self) -> None:
+        if not (0.0 <= self.injection < 1.0 and 0.0 <= self.reset_share <= 1.0 and self.patience >= 1):
+            raise ConfigError("injection and reset_share are shares, patience at least 1", where="Recovery")
+
+
+class ParticleState(NamedTuple):
+    """State of one track: the filter (None before the first usable scan), key of its random numbers, bookkeeping."""
+
+    key: tuple[int, int]
+    filter: FilterState | None = None
+    draw: int = 0
+    why: Why = Why()
+    n_moves: int = 0
+    contradictions: int = 0
+    is_settled: bool = False
+    ess: float = 1.0
+    marks: tuple[float, ...] = ()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ParticleEngine:
+    """Particle filter over steps and scans.
+
+    Parameters
+    ----------
+    radio_map : answers scans. observation, motion, first, constraint : the models; constraint None = no map.
+    diffusion : motion while no motion sensor speaks. uses_steps : False = steps are ignored, diffusion always.
+    rotation : rad, heading of building +x from east (headings arrive counter-clockwise from east).
+    """
+
+    radio_map: SparseKnn
+    observation: FingerprintLikelihood
+    first: FirstCloud
+    prior: Estimate
+    motion: PdrMotion
+    diffusion: RandomWalk
+    constraint: Constraint | None = None
+    filter: ParticleFilter = field(default_factory=ParticleFilter)
+    recovery: Recovery = field(default_factory=Recovery)
+    summary: Summary = field(default_factory=Summary)
+    n_particles: int = 1000
+    uses_steps: bool = True
+    rotation: float = 0.0
+    supports_lag: bool = True
+
+    def __post_init__(self) -> None:
+        if self.n_particles < 10:
+            raise ConfigError(
+                f"n_particles must be at least 10, got {self.n_particles}", where="ParticleEngine"
+            )
+
+    def init(self, track: str, seed: int) -> ParticleState:
+        """State before the first record."""
+        return ParticleState(track_key(seed, track))
+
+    def on_step(self, state: ParticleState, event: StepEvent, *, heading_known: bool) -> ParticleState:
+        """Move by a step; before the first scan there is nothing to move."""
+        if not self.uses_steps:
+            return state
+        why = state.why._replace(n_steps=state.why.n_steps + 1)
+        if state.filter is None:
+            return state._replace(why=why)
+        step = StepInput(event.length, event.heading - self.rotation)
+        after, n_blocked = self.filter.predict(state.key, state.filter, self.motion, step, self.constraint)
+        return self._moved(state, after, n_blocked, why)
+
+    def on_quiet(self, state: ParticleState, dt: float) -> ParticleState:
+        """Diffuse."""
+        if state.filter is None or dt <= 0.0:
+            return state
+        after, n_blocked = self.filter.predict(state.key, state.filter, self.diffusion, dt, self.constraint)
+        return self._moved(state, after, n_blocked, state.why)
+
+    def on_fingerprint(
+        self,
+        state: ParticleState,
+        t: float,
+        fingerprint: Fingerprint,
+        *,
+        heading_known: bool,
+    ) -> ParticleState:
+        """Weigh by a scan; the first one makes the cloud. A scan of unknown access points changes nothing."""
+        near = self.radio_map.neighbours(fingerprint)
+        if near is None:
+            return state
+        why = state.why._replace(n_aps=max(state.why.n_aps, near.n_aps))
+        if state.filter is None:
+            noise = Noise(state.key, state.draw)
+            cloud = self.first.draw(noise, near, self.n_particles, heading_known=heading_known)
+            fresh = FilterState(cloud, np.zeros(self.n_particles), noise.draw)
+            return state._replace(filter=fresh, draw=noise.draw, why=why)
+        log_likelihood = np.zeros(self.n_particles)
+        self.observation.log_likelihood(state.filter.cloud, near, log_likelihood)
+        agreement = self.observation.agreement(state.filter.weights, log_likelihood, near)
+        inject = self.recovery.injection > 0.0
+        after, info = self.filter.update(state.key, state.filter, log_likelihood, always_resample=inject)
+        contradictions = state.contradictions + 1 if agreement < self.recovery.agreement else 0
+        share = self.recovery.injection
+        if contradictions and contradictions % self.recovery.patience == 0:
+            share = self.recovery.reset_share
+        after = self._inject(state.key, after, near, share, heading_known)
+        ess = info.ess / self.n_particles
+        return state._replace(filter=after, draw=after.draw, why=why, contradictions=contradictions, ess=ess)
+
+    def estimate(self, state: ParticleState, t: float) -> tuple[ParticleState, Estimate]:
+        """Geometric median on the heaviest floor, with radii."""
+        if state.filter is None:
+            return self._explained(state, unknown(t, self.prior))
+        cloud = state.filter.cloud
+        return self._say(state, t, Snapshot(t, cloud.x, cloud.y, cloud.floor))
+
+    def mark(self, state: ParticleState, t: float) -> ParticleState:
+        """Keep where the particles are, so that their descendants can say where they came from."""
+        if state.filter is None:
+            return state._replace(marks=(*state.marks, t))
+        cloud = state.filter.cloud
+        history = (*state.filter.history, Snapshot(t, cloud.x, cloud.y, cloud.floor))
+        return state._replace(filter=state.filter._replace(history=history), marks=(*state.marks, t))
+
+    def recall(self, state: ParticleState) -> tuple[ParticleState, Estimate]:
+        """Where the ancestors of today's particles were at the oldest mark, weighted by what is known today."""
+        t, marks = state.marks[0], state.marks[1:]
+        state = state._replace(marks=marks)
+        if state.filter is None or not state.filter.history or state.filter.history[0].t != t:
+            return self._explained(state, unknown(t, self.prior))
+        past = state.filter.history[0]
+        state = state._replace(filter=state.filter._replace(history=state.filter.history[1:]))
+        return self._say(state, t, past)
+
+    def _moved(self, state: ParticleState, after: FilterState, n_blocked: int, why: Why) -> ParticleState:
+        blocked = why._replace(share_blocked=why.share_blocked + n_blocked / self.n_particles)
+        return state._replace(filter=after, draw=after.draw, why=blocked, n_moves=state.n_moves + 1)
+
+    def _inject(
+        self, key: tuple[int, int], state: FilterState, near: Neighbours, share: float, heading_known: bool
+    ) -> FilterState:
+        n = round(share * self.n_particles)
+        if n == 0:
+            return state
+        noise = Noise(key, state.draw)
+        fresh = self.first.draw(noise, near, n, heading_known=heading_known)
+        # distinct slots: a random start and an even stride over the resampled (hence equally weighted) particles
+        start = noise.uniforms(1)[0, 0] * self.n_particles
+        slots = (np.floor(start + np.arange(n) * (self.n_particles / n)).astype(np.int64)) % self.n_particles
+        return replace_particles(state._replace(draw=noise.draw), slots, fresh)
+
+    def _say(self, state: ParticleState, t: float, where: Snapshot) -> tuple[ParticleState, Estimate]:
+        assert state.filter is not None  # noqa: S101 (callers checked)
+        e = summarise(where, state.filter.weights, len(self.radio_map.floors), t, self.summary)
+        is_settled = state.is_settled or e.r95 <= self.recovery.settled
+        lost = state.contradictions >= self.recovery.patience or (is_settled and e.r95 > self.recovery.lost)
+        label = State.LOST if lost else State.TRACKING if is_settled else State.INITIALISING
+        return self._explained(state._replace(is_settled=is_settled), e._replace(state=label))
+
+    @staticmethod
+    def _explained(state: ParticleState, e: Estimate) -> tuple[ParticleState, Estimate]:
+        why = state.why
+        blocked = why.share_blocked / state.n_moves if state.n_moves else 0.0
+        said = e._replace(n_steps=why.n_steps, n_aps=why.n_aps, share_blocked=blocked, ess=state.ess)
+        return state._replace(why=Why(), n_moves=0), said

@@ -1,0 +1,269 @@
+"""The tracker: records in, estimates out; live or replayed, one record or a recording at a time.
+
+`Tracker.step` is the live form: state and record in, state and estimates out. `Tracker.run` replays a whole
+recording with the array path of the front end and gives the same bits. Estimates come at every delivered scan and at
+least once per `interval`; an estimate for time t uses records up to t (plus the lag, where one is asked).
+
+Bad records never stop a track: they get a `Verdict` and are counted.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass, field
+from typing import Generic, NamedTuple, TypeVar
+
+import numpy as np
+
+from wayfuse.core.errors import ConfigError, UsageError
+from wayfuse.core.types import Array
+from wayfuse.inertial.front_end import FrontEndState, InertialFrontEnd, StepEvent
+from wayfuse.radio.scans import ScanBuffer, ScanState
+from wayfuse.sensors.quality import Verdict
+from wayfuse.sensors.recording import Recording
+from wayfuse.sensors.records import (
+    Acceleration,
+    MagneticField,
+    Orientation,
+    Record,
+    RotationRate,
+    WifiScan,
+)
+from wayfuse.tracking.engine import Engine
+from wayfuse.tracking.estimate import Estimate
+
+__all__ = ["Track", "TrackState", "Tracker"]
+
+S = TypeVar("S")
+
+_MOTION = (Acceleration, RotationRate, MagneticField, Orientation)
+_QUIET_AFTER = 2.0  # s without motion sensors until a method diffuses (a standing phone still reports)
+_LONGEST_GAP = 300.0  # s; after a longer silence the track starts anew: the person can be anywhere
+
+
+class TrackState(NamedTuple, Generic[S]):
+    """Everything a track needs to go on; a value: keep it and it is a checkpoint."""
+
+    name: str
+    seed: int
+    front_end: FrontEndState
+    scans: ScanState
+    engine: S
+    now: float = -np.inf
+    next_output: float = np.inf
+    last_heard: float = np.inf
+    last_motion: float = -np.inf
+    diffused: float = -np.inf
+    pending: tuple[float, ...] = ()
+
+
+class _Replay(NamedTuple):
+    """What `step` sees record by record, for a recording that is at hand whole.
+
+    motion : (n,) s, acceleration times. breaks : times at which motion sensors or scans end a long silence.
+    """
+
+    motion: Array
+    breaks: tuple[float, ...]
+
+    @classmethod
+    def of(cls, recording: Recording) -> _Replay:
+        motion = recording.acceleration.t
+        heard = np.sort(np.concatenate([motion, [scan.t for scan in recording.wifi]]))
+        return cls(motion, tuple(heard[1:][np.diff(heard) > _LONGEST_GAP].tolist()))
+
+    def last_motion(self, t: float) -> float:
+        i = int(np.searchsorted(self.motion, t, side="right"))
+        return float(self.motion[i - 1]) if i else -np.inf
+
+
+class Track(NamedTuple):
+    """A finished track: its estimates in time order, and what became of the records."""
+
+    name: str
+    estimates: list[Estimate]
+    verdicts: Counter[Verdict]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Tracker(Generic[S]):
+    """Routes records to the front end and the engine, and asks for estimates.
+
+    Parameters
+    ----------
+    engine : the positioning method. front_end, scan_buffer : motion records to steps, scans to fingerprints.
+    interval : s, longest time between estimates. lag : s, estimates are given this much later and better.
+    """
+
+    engine: Engine[S]
+    front_end: InertialFrontEnd = field(default_factory=InertialFrontEnd)
+    scan_buffer: ScanBuffer = field(default_factory=ScanBuffer)
+    interval: float = 1.0
+    lag: float = 0.0
+
+    def __post_init__(self) -> None:
+        if not self.interval > 0.0 or not self.lag >= 0.0:
+            raise ConfigError(
+                f"interval must be positive and lag not negative, got {self.interval}, {self.lag}"
+            )
+        if self.lag > 0.0 and not self.engine.supports_lag:
+            raise UsageError("this method has no lag", where="--lag", remedy="leave --lag out, or use fused")
+
+    def init(self, name: str, seed: int = 0) -> TrackState[S]:
+        """State before the first record of a track; equal names and seeds give equal bits."""
+        return TrackState(
+            name, seed, self.front_end.init(), self.scan_buffer.init(), self.engine.init(name, seed)
+        )
+
+    def step(self, state: TrackState[S], record: Record) -> tuple[TrackState[S], list[Estimate], Verdict]:
+        """Take one record: the state after it, the estimates that are due, and what became of the record."""
+        if not np.isfinite(record.t):
+            return state, [], Verdict.NOT_FINITE
+        if record.t < state.now:
+            return state, [], Verdict.LATE
+        out: list[Estimate] = []
+        if isinstance(record, Acceleration | WifiScan):
+            if record.t - state.last_heard > _LONGEST_GAP:
+                state = self._restart(state, record.t, out, None)
+            state = state._replace(last_heard=record.t)
+        state = self._advance(state, record.t, out, None)
+        if isinstance(record, WifiScan):
+            state, verdict = self._scan(state, record, out)
+            return state, out, verdict
+        if not isinstance(record, _MOTION):
+            return (
+                state,
+                out,
+                Verdict.IGNORED,
+            )  # waypoints are truth, not input; ranges and BLE have no model yet
+        front_end, event = self.front_end.step(state.front_end, record)
+        state = state._replace(front_end=front_end)
+        if isinstance(record, Acceleration):
+            state = state._replace(last_motion=record.t)
+        if event is not None:
+            state = self._step_event(state, event)
+        return state, out, Verdict.USED
+
+    def flush(self, state: TrackState[S], until: float) -> tuple[TrackState[S], list[Estimate]]:
+        """The estimates still due up to a time, and those that wait for their lag."""
+        out: list[Estimate] = []
+        state = self._finish(state, until, out, None)
+        return state, out
+
+    def run(self, recording: Recording, seed: int = 0) -> Track:
+        """Replay a recording: the same bits as `step` over its records and `flush` at its end."""
+        state = self.init(recording.name, seed)
+        out: list[Estimate] = []
+        verdicts: Counter[Verdict] = Counter()
+        if recording.is_empty:
+            return Track(recording.name, out, verdicts)
+        start, end = recording.span
+        replay = _Replay.of(recording)
+        state = self._advance(state, start, out, replay)
+        done = -np.inf
+        for scan in recording.wifi:
+            state = self._steps(state, recording, replay, (done, scan.t), out)
+            done = scan.t
+            state = self._advance(state, scan.t, out, replay)
+            state, verdict = self._scan(state, scan, out)
+            verdicts[verdict] += 1
+        state = self._steps(state, recording, replay, (done, end), out)
+        state = self._advance(state, end, out, replay)
+        self._finish(state, end, out, replay)
+        return Track(recording.name, out, verdicts)
+
+    def _steps(
+        self,
+        state: TrackState[S],
+        recording: Recording,
+        replay: _Replay,
+        within: tuple[float, float],
+        out: list[Estimate],
+    ) -> TrackState[S]:
+        """Feed the motion records with within[0] < t <= within[1] through the array path of the front end."""
+        # whether the heading is absolute matters at scans only, so the state at the end of the stretch will do
+        front_end, steps = self.front_end.run(state.front_end, recording, *within)
+        state = state._replace(front_end=front_end)
+        for row in zip(*(column.tolist() for column in steps), strict=True):
+            event = StepEvent(*row)
+            state = self._advance(state, event.t, out, replay)
+            state = self._step_event(state, event)
+        return state
+
+    def _advance(
+        self, state: TrackState[S], t: float, out: list[Estimate], replay: _Replay | None
+    ) -> TrackState[S]:
+        """Let time pass to t: the outputs due before t, then t itself."""
+        if state.now == -np.inf:
+            return self._heard(state._replace(now=t, next_output=t, diffused=t), t, replay)
+        if replay is not None:
+            for silence_ends in replay.breaks:
+                if state.now < silence_ends <= t:
+                    state = self._restart(state, silence_ends, out, replay)
+        while state.next_output < t:
+            state = self._output(self._heard(state, state.next_output, replay), state.next_output, out)
+        return self._heard(state._replace(now=t), t, replay)
+
+    def _restart(
+        self, state: TrackState[S], t: float, out: list[Estimate], replay: _Replay | None
+    ) -> TrackState[S]:
+        """After a long silence the person can be anywhere: finish what was, begin anew under a name of its own."""
+        state = self._finish(state, state.now, out, replay)
+        fresh = self.init(f"{state.name}@{t:.3f}", state.seed)
+        return fresh._replace(front_end=state.front_end, now=t, next_output=t, diffused=t, last_heard=t)
+
+    @staticmethod
+    def _heard(state: TrackState[S], t: float, replay: _Replay | None) -> TrackState[S]:
+        return state if replay is None else state._replace(last_motion=replay.last_motion(t))
+
+    def _finish(
+        self, state: TrackState[S], until: float, out: list[Estimate], replay: _Replay | None
+    ) -> TrackState[S]:
+        while state.next_output <= until:
+            state = self._output(self._heard(state, state.next_output, replay), state.next_output, out)
+        while state.pending:
+            state = self._recall(state, out)
+        return state
+
+    def _step_event(self, state: TrackState[S], event: StepEvent) -> TrackState[S]:
+        engine = self.engine.on_step(state.engine, event, heading_known=state.front_end.is_heading_absolute)
+        return state._replace(engine=engine)
+
+    def _scan(
+        self, state: TrackState[S], scan: WifiScan, out: list[Estimate]
+    ) -> tuple[TrackState[S], Verdict]:
+        scans, fingerprint = self.scan_buffer.step(state.scans, scan)
+        repeated = scans is state.scans
+        state = self._diffuse(state._replace(scans=scans), scan.t)
+        if fingerprint is not None:
+            known = state.front_end.is_heading_absolute
+            before = state.engine
+            engine = self.engine.on_fingerprint(before, scan.t, fingerprint, heading_known=known)
+            state = state._replace(engine=engine)
+            verdict = Verdict.USED if engine is not before else Verdict.UNKNOWN_ACCESS_POINTS
+        else:
+            verdict = Verdict.DUPLICATE if repeated else Verdict.OUT_OF_RANGE
+        return self._output(state, scan.t, out), verdict
+
+    def _diffuse(self, state: TrackState[S], t: float) -> TrackState[S]:
+        spoke = state.last_motion if self.engine.uses_steps else -np.inf
+        if t - spoke <= _QUIET_AFTER:
+            return state._replace(diffused=t)
+        engine = self.engine.on_quiet(state.engine, t - max(state.diffused, spoke))
+        return state._replace(engine=engine, diffused=t)
+
+    def _output(self, state: TrackState[S], t: float, out: list[Estimate]) -> TrackState[S]:
+        state = self._diffuse(state, t)._replace(next_output=t + self.interval)
+        if self.lag == 0.0:
+            engine, estimate = self.engine.estimate(state.engine, t)
+            out.append(estimate)
+            return state._replace(engine=engine)
+        state = state._replace(engine=self.engine.mark(state.engine, t), pending=(*state.pending, t))
+        while state.pending and state.pending[0] + self.lag <= t:
+            state = self._recall(state, out)
+        return state
+
+    def _recall(self, state: TrackState[S], out: list[Estimate]) -> TrackState[S]:
+        engine, estimate = self.engine.recall(state.engine)
+        out.append(estimate)
+        return state._replace(engine=engine, pending=state.pending[1:])
