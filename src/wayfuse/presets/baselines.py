@@ -20,7 +20,7 @@ __all__ = ["RANDOM_WALK", "dead_reckoning", "nnss", "random_walk", "wknn"]
 
 RANDOM_WALK = Config(
     use_steps=False,
-    use_map=False,
+    map_constraint="none",
     diffusion=3.0,
     exponent=2.0,
     coverage_gain=0.0,

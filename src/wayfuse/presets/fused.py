@@ -8,14 +8,16 @@ particle filter), chu2009 (floor plan as constraint), li2015 (step length per pa
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from typing import Literal
 
 import numpy as np
 
 from wayfuse.core.errors import RadioMapError
-from wayfuse.filters.particle_filter import ParticleFilter
+from wayfuse.filters.particle_filter import Constraint, ParticleFilter
 from wayfuse.filters.resampling import resampler
 from wayfuse.maps.site import Site
 from wayfuse.models.constraint.barriers import Barriers
+from wayfuse.models.constraint.walkable_mask import WalkableMask
 from wayfuse.models.initial import FirstCloud
 from wayfuse.models.motion.pdr import PdrMotion
 from wayfuse.models.motion.random_walk import RandomWalk
@@ -56,7 +58,7 @@ class Config:
     injection: float = 0.005  # share of particles per scan
     penalty: float = 1.2  # nats per blocked move
     diffusion: float = 1.2  # m per root second, where motion sensors are silent
-    use_map: bool = True
+    map_constraint: Literal["walkable", "barriers", "none"] = "walkable"
     use_steps: bool = True
     summary: Summary = field(default_factory=Summary)
 
@@ -81,7 +83,7 @@ def build(
     )
     first = FirstCloud(
         observation=observation,
-        walkable=tuple(floor.walkable for floor in site.floors) if c.use_map else (),
+        walkable=tuple(floor.walkable for floor in site.floors) if c.map_constraint != "none" else (),
         bias_sigma=c.first_bias_sigma,
         scale_sigma=c.first_scale_sigma,
     )
@@ -97,7 +99,7 @@ def build(
             scale_sigma=c.scale_sigma,
         ),
         diffusion=RandomWalk(c.diffusion),
-        constraint=Barriers(tuple(f.barrier_index for f in site.floors), c.penalty) if c.use_map else None,
+        constraint=_constraint(site, c),
         filter=ParticleFilter(resampler(c.resampling)),
         recovery=Recovery(injection=c.injection),
         summary=c.summary,
@@ -106,6 +108,14 @@ def build(
         rotation=site.anchor.rotation if site.anchor is not None else 0.0,
     )
     return Tracker(engine=engine, lag=lag)
+
+
+def _constraint(site: Site, c: Config) -> Constraint | None:
+    if c.map_constraint == "walkable":
+        return WalkableMask(tuple(f.walkable for f in site.floors), c.penalty)
+    if c.map_constraint == "barriers":
+        return Barriers(tuple(f.barrier_index for f in site.floors), c.penalty)
+    return None
 
 
 def check_floors(site: Site, survey: Survey) -> None:
@@ -146,7 +156,7 @@ def prior_estimate(site: Site) -> Estimate:
 def without(config: Config, part: str) -> Config:
     """The configuration without one of its parts: ``map``, ``steps``, ``2.4`` or ``5`` (GHz)."""
     changes = {
-        "map": replace(config, use_map=False),
+        "map": replace(config, map_constraint="none"),
         "steps": replace(config, use_steps=False),
         "2.4": replace(config, bands=BAND_5),
         "5": replace(config, bands=BAND_2_4),
