@@ -359,7 +359,7 @@ class _Grid:
         """Errors of a track whose places in the common frame are ``xy``."""
         row = last_at_or_before(track.t, self.t)
         missing = row < 0
-        row = np.maximum(row, 0)
+        row = self._after_knowing_nothing(np.maximum(row, 0), track)
         offset = xy[row] - self.xy
         cov = np.stack([track.number(name)[row] for name in ("var_x", "var_y", "cov_xy")], axis=1)
         return PointErrors(
@@ -378,3 +378,12 @@ class _Grid:
             state=track.states()[row],
             survey_distance=self.survey_distance,
         )
+
+    def _after_knowing_nothing(self, row: IntArray, track: WalkEstimates) -> IntArray:
+        """Rows of before the first scan, where a tracker only knows the building, become the first row after."""
+        start = self.t[0] - self.since_start[0] if len(self.t) else 0.0
+        first = int(np.searchsorted(track.t, start - TIME_TOLERANCE))
+        if first >= len(track):
+            return row
+        ignorant = (row < first) & (track.states()[row] == "initialising")
+        return np.where(ignorant, first, row)
