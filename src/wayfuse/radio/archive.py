@@ -24,7 +24,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from wayfuse.core.errors import RadioMapError
+from wayfuse.core.errors import ConfigError, RadioMapError
 from wayfuse.radio.radio_map import RadioMap
 from wayfuse.radio.survey import Survey
 
@@ -284,6 +284,8 @@ def _check_survey(
         indptr, indices, k = parts["indptr"], parts["indices"], len(parts["rssi"])
         sound = (
             len(indptr) == len(parts["xy"]) + 1
+            and len(parts["floor"]) == len(parts["walk"]) == len(parts["xy"])
+            and len(parts["frequency"]) == len(parts["bssid"])
             and len(indices) == k
             and int(indptr[0]) == 0
             and int(indptr[-1]) == k
@@ -316,7 +318,7 @@ def load(path: str | os.PathLike[str]) -> RadioMap:
     kind, header, arrays = read_archive(path, version=_MAP_VERSION)
     try:
         return _rebuilt(kind, header, arrays, path)
-    except (KeyError, TypeError, ValueError, IndexError) as fault:
+    except (KeyError, TypeError, ValueError, IndexError, ConfigError) as fault:
         raise RadioMapError(
             f"the parts of the {kind} map do not fit: {fault}", where=path, remedy=_AGAIN
         ) from fault

@@ -30,6 +30,7 @@ from wayfuse.radio.nnss import position_means
 from wayfuse.radio.radio_map import (
     check_queries,
     locate_one,
+    parts_error,
     query_vector,
     require,
     require_readings,
@@ -111,7 +112,10 @@ class GaussianKernelMap:
 
     @classmethod
     def from_parts(cls, header: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]]) -> GaussianKernelMap:
-        """The map of what `parts` gave."""
+        """The map of what `parts` gave; `ValueError` where they do not fit."""
+        m, p = len(arrays["bssid"]), len(arrays["floor"])
+        if fault := parts_error(arrays, {"bssid": (m,), "xy": (p, 2), "floor": (p,), "mean": (p, m)}, "ufif"):
+            raise ValueError(fault)
         names = ("sigma", "missing", "n_neighbours", "exponent")
         fields: dict[str, Any] = {**{name: header[name] for name in names}, **arrays}
         return cls(floors=tuple(header["floors"]), **fields)

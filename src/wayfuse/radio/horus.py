@@ -31,6 +31,7 @@ from wayfuse.radio.radio_map import (
     group_positions,
     locate_one,
     mixture_log_likelihood,
+    parts_error,
     query_vector,
     require,
     require_readings,
@@ -115,7 +116,18 @@ class HorusMap:
 
     @classmethod
     def from_parts(cls, header: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]]) -> HorusMap:
-        """The map of what `parts` gave."""
+        """The map of what `parts` gave; `ValueError` where they do not fit."""
+        m, p = len(arrays["bssid"]), len(arrays["floor"])
+        shapes = {
+            "bssid": (m,),
+            "xy": (p, 2),
+            "floor": (p,),
+            "mean": (p, m),
+            "sigma": (p, m),
+            "heard": (p, m),
+        }
+        if fault := parts_error(arrays, shapes, "ufifff"):
+            raise ValueError(fault)
         names = ("n_candidates", "exponent", "bandwidth")
         fields: dict[str, Any] = {**{name: header[name] for name in names}, **arrays}
         return cls(floors=tuple(header["floors"]), **fields)

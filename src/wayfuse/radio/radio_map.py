@@ -24,6 +24,7 @@ __all__ = [
     "group_positions",
     "locate_one",
     "mixture_log_likelihood",
+    "parts_error",
     "query_vector",
     "require",
     "require_readings",
@@ -78,6 +79,19 @@ def require(condition: bool, what: str, remedy: str) -> None:
     """Raise `ConfigError` unless a parameter is in its range."""
     if not condition:
         raise ConfigError(what, remedy=remedy)
+
+
+def parts_error(
+    arrays: Mapping[str, NDArray[Any]], shapes: Mapping[str, tuple[int, ...]], dtypes: str
+) -> str:
+    """What is wrong with the arrays of a stored map: a shape, a kind of dtype (one letter each); "" if sound."""
+    for (name, shape), kind in zip(shapes.items(), dtypes, strict=True):
+        array = arrays[name]
+        if array.shape != shape or array.dtype.kind != kind:
+            return f"{name} is {array.dtype} of shape {array.shape}, not {shape}"
+        if kind == "f" and not np.all(np.isfinite(array)):
+            return f"{name} is not finite"
+    return ""
 
 
 def require_readings(survey: Survey) -> None:
