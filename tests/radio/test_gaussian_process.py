@@ -11,6 +11,7 @@ from scipy.stats import norm
 
 from wayfuse.core.errors import ConfigError, RadioMapError
 from wayfuse.radio import gaussian_process
+from wayfuse.radio._grid_kernels import field_log_likelihood
 from wayfuse.radio.censoring import expected_when_silent, log_silence
 from wayfuse.radio.gaussian_process import Noise
 from wayfuse.radio.gp_fit import fit_fields
@@ -77,10 +78,10 @@ def test_the_marginal_likelihood_and_its_gradient() -> None:
 
 def test_the_kernel_is_found_again() -> None:
     rng = np.random.default_rng(3)
-    xy = rng.uniform(0, 30, (250, 2))
+    xy = rng.uniform(0, 24, (150, 2))
     true = Kernel(6.0, 10.0, 3.0, 1.5, 2.0)
-    lower = np.linalg.cholesky(_covariance(xy, xy, true) + true.noise**2 * np.eye(250))
-    found = fit_kernel([(xy, lower @ rng.normal(size=(250, 30)))], Kernel(3.0, 5.0, 2.0, 1.0, 4.0))
+    lower = np.linalg.cholesky(_covariance(xy, xy, true) + true.noise**2 * np.eye(150))
+    found = fit_kernel([(xy, lower @ rng.normal(size=(150, 30)))], Kernel(3.0, 5.0, 2.0, 1.0, 4.0))
     np.testing.assert_allclose(found, true, rtol=0.25)
 
 
@@ -169,6 +170,24 @@ def test_the_likelihood_is_student_t_plus_silence() -> None:
                 total += -3.0 * np.log1p(((z - mean) / sigma) ** 2 / 5.0) - np.log(sigma)
         want.append(0.5 * total)
     np.testing.assert_allclose(got, want, rtol=1e-4)
+
+
+@pytest.mark.parametrize("n_aps", [1, 300])
+def test_the_kernel_equals_its_plain_twin(n_aps: int) -> None:
+    rng = np.random.default_rng(5)
+    mean, sigma = rng.uniform(-100, -40, (30, n_aps)), rng.uniform(2, 9, (30, n_aps))
+    silence = rng.uniform(-3, 0, (30, n_aps))
+    node, weight = rng.integers(0, 30, (11, 4)), rng.dirichlet(np.ones(4), 11)
+    heard = np.flatnonzero(rng.random(n_aps) < 0.7) if n_aps > 1 else np.array([0])
+    z = rng.uniform(-100, 100_000, len(heard))  # also absurd readings: no overflow
+    tables = [t.astype(np.float32) for t in (mean, sigma, silence)]
+    total = tables[2].sum(axis=1, dtype=np.float64)
+    got = np.empty(11)
+    field_log_likelihood(node, weight, *tables, total, heard, z, 3.0, got)
+    m, s, q = (np.einsum("nk,nkh->nh", weight, t[node[:, :, None], heard[None, None]]) for t in tables)
+    tail = -2.0 * np.log1p(((z - m) / s) ** 2 / 3.0) - np.log(s)
+    want = tail.sum(axis=1) + (weight * total[node]).sum(axis=1) - q.sum(axis=1)
+    np.testing.assert_allclose(got, want, rtol=1e-5)
 
 
 def test_large_floors_are_thinned_and_wide_ones_get_a_coarser_grid() -> None:

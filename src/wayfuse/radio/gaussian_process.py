@@ -174,6 +174,8 @@ class GaussianProcessMap:
         Beyond the grid the value of its edge holds; on a floor without a survey every access point counts as
         too weak to hear.
         """
+        from wayfuse.radio._grid_kernels import field_log_likelihood
+
         vector = query_vector(self.bssid, fingerprint).astype(np.float64)
         heard = np.flatnonzero(np.isfinite(vector))
         out = np.zeros(len(xy))
@@ -188,12 +190,10 @@ class GaussianProcessMap:
                 out[here] = _log_student(z, mean, sigma, self.noise.dof)[0]
                 continue
             node, weight = grid.corners(places[here])
-            at = node[:, :, None], heard[None, None]
-            mean, sigma, silence = (
-                np.einsum("nk,nkh->nh", weight, table[at]) for table in (grid.mean, grid.sigma, grid.silence)
-            )
-            silent = (weight * grid.total_silence[node]).sum(axis=1) - silence.sum(axis=1)
-            out[here] = _log_student(z, mean, sigma, self.noise.dof) + silent
+            part = np.empty(len(here))
+            tables = (grid.mean, grid.sigma, grid.silence, grid.total_silence)
+            field_log_likelihood(node, weight, *tables, heard, z, self.noise.dof, part)
+            out[here] = part
         return self.noise.exponent * out
 
     def parts(self) -> tuple[str, Mapping[str, Any], Mapping[str, NDArray[Any]]]:
