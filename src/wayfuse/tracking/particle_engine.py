@@ -104,11 +104,9 @@ class ParticleEngine:
 
     def on_step(self, state: ParticleState, event: StepEvent, *, heading_known: bool) -> ParticleState:
         """Move by a step; before the first scan there is nothing to move."""
-        if not self.uses_steps:
+        if not self.uses_steps or state.filter is None:
             return state
         why = state.why._replace(n_steps=state.why.n_steps + 1)
-        if state.filter is None:
-            return state._replace(why=why)
         step = StepInput(event.length, event.heading - self.rotation)
         after, n_blocked = self.filter.predict(state.key, state.filter, self.motion, step, self.constraint)
         return self._moved(state, after, n_blocked, why)

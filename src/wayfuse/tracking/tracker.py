@@ -1,8 +1,8 @@
 """The tracker: records in, estimates out; live or replayed, one record or a recording at a time.
 
 `Tracker.step` is the live form: state and record in, state and estimates out. `Tracker.run` replays a whole
-recording with the array path of the front end and gives the same bits. Estimates come at every delivered scan and at
-least once per `interval`; an estimate for time t uses records up to t (plus the lag, where one is asked).
+recording with the array path of the front end and gives the same bits. Estimates come at every delivered scan, at
+every step that moves the method, and at least once per `interval`; an estimate for time t uses records up to t (plus the lag, where one is asked).
 
 Bad records never stop a track: they get a `Verdict` and are counted.
 """
@@ -141,7 +141,7 @@ class Tracker(Generic[S]):
         if isinstance(record, Acceleration):
             state = state._replace(last_motion=record.t)
         if event is not None:
-            state = self._step_event(state, event)
+            state = self._step_event(state, event, out)
         return state, out, Verdict.USED
 
     def flush(self, state: TrackState[S], until: float) -> tuple[TrackState[S], list[Estimate]]:
@@ -187,7 +187,7 @@ class Tracker(Generic[S]):
         for row in zip(*(column.tolist() for column in steps), strict=True):
             event = StepEvent(*row)
             state = self._advance(state, event.t, out, replay)
-            state = self._step_event(state, event)
+            state = self._step_event(state, event, out)
         return state
 
     def _advance(
@@ -225,9 +225,11 @@ class Tracker(Generic[S]):
             state = self._recall(state, out)
         return state
 
-    def _step_event(self, state: TrackState[S], event: StepEvent) -> TrackState[S]:
+    def _step_event(self, state: TrackState[S], event: StepEvent, out: list[Estimate]) -> TrackState[S]:
         engine = self.engine.on_step(state.engine, event, heading_known=state.front_end.is_heading_absolute)
-        return state._replace(engine=engine)
+        if engine is state.engine:
+            return state
+        return self._output(state._replace(engine=engine), event.t, out)
 
     def _scan(
         self, state: TrackState[S], scan: WifiScan, out: list[Estimate]
