@@ -1,7 +1,7 @@
 """Counter-based random numbers: Philox4x32-10 and Box-Muller normals.
 
 The number of a particle at a draw depends on (seed, track, draw, particle) and on nothing else: no state to store,
-the same bits whatever the batch, process or machine (up to the platform's libm), replay from any point.
+the same bits whatever the batch, process or machine (own polynomials, no libm), replay from any point.
 
 References
 ----------
@@ -17,6 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from wayfuse.core.elementary import log32, sincos_turn32
 from wayfuse.core.jit import kernel
 from wayfuse.core.types import Array, Array32
 
@@ -59,14 +60,15 @@ def philox_words(
 
 @kernel
 def _normals(words: NDArray[np.uint32], out: Array32) -> None:
-    scale = 2.0**-32
-    for i in range(words.shape[1]):
-        for pair in range(2):
-            u = (np.float64(words[2 * pair, i]) + 0.5) * scale
-            v = (np.float64(words[2 * pair + 1, i]) + 0.5) * scale
-            r = math.sqrt(-2.0 * math.log(u))
-            out[2 * pair, i] = np.float32(r * math.cos(2.0 * math.pi * v))
-            out[2 * pair + 1, i] = np.float32(r * math.sin(2.0 * math.pi * v))
+    # Box-Muller; u lies on the middles of 2^24 equal parts of (0, 1), so the largest normal is 5.9
+    scale = np.float32(2.0**-24)
+    for pair in range(2):
+        for i in range(words.shape[1]):
+            u = (np.float32(words[2 * pair, i] >> np.uint32(8)) + np.float32(0.5)) * scale
+            r = np.float32(math.sqrt(np.float32(-2.0) * log32(min(u, np.float32(1.0 - 2.0**-24)))))
+            sine, cosine = sincos_turn32(words[2 * pair + 1, i])
+            out[2 * pair, i] = r * cosine
+            out[2 * pair + 1, i] = r * sine
 
 
 def track_key(seed: int, track: str) -> tuple[int, int]:

@@ -85,10 +85,10 @@ def crosses_one(
 
 @kernel
 def crosses_many(
-    x0: Array,
-    y0: Array,
-    x1: Array,
-    y1: Array,
+    x0: NDArray[np.floating],
+    y0: NDArray[np.floating],
+    x1: NDArray[np.floating],
+    y1: NDArray[np.floating],
     grid: Array,
     clearance: NDArray[np.uint8],
     start: NDArray[np.int32],

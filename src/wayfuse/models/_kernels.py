@@ -7,6 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from wayfuse.core.elementary import exp32, log32
 from wayfuse.core.jit import fast_kernel, kernel
 from wayfuse.core.types import Array, Array32
 
@@ -109,14 +110,17 @@ def mixture_log_likelihood(
     out: Array,
 ) -> None:
     """Add exponent * log(sum_j w_j exp(-r_ij² / 2 sigma²) + background) over places j on the particle's floor."""
+    # places in the outer loop: the inner one has no branch and is vectorised
     half = np.float32(-0.5 / (sigma * sigma))
+    total = np.full(x.shape[0], np.float32(background))
+    for j in range(place_x.shape[0]):
+        px = place_x[j]
+        py = place_y[j]
+        w = weight[j]
+        f = place_floor[j]
+        for i in range(x.shape[0]):
+            dx = x[i] - px
+            dy = y[i] - py
+            total[i] += (w if floor[i] == f else np.float32(0.0)) * exp32(half * (dx * dx + dy * dy))
     for i in range(x.shape[0]):
-        total = np.float32(background)
-        for j in range(place_x.shape[0]):
-            if place_floor[j] == floor[i]:
-                dx = x[i] - place_x[j]
-                dy = y[i] - place_y[j]
-                e = half * (dx * dx + dy * dy)
-                if e > np.float32(-20.0):
-                    total += weight[j] * math.exp(e)
-        out[i] += exponent * math.log(total)
+        out[i] += exponent * log32(total[i])

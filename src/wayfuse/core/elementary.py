@@ -1,0 +1,71 @@
+"""exp, log and sincos in float32, as short polynomials that kernels can inline and vectorise.
+
+The numba of the package index has no vector mathematics library: `math.exp` in a loop is a scalar call. These are
+accurate to a few units in 1e-6, ample for weights and noise, and give the same bits on every machine (no libm).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from wayfuse.core.jit import inline_kernel
+
+__all__ = ["exp32", "log32", "sincos_turn32"]
+
+
+@inline_kernel
+def exp32(x: np.float32) -> np.float32:
+    """exp(x) for x in [-80, 80], relative error below 1e-6; clamped outside."""
+    x = min(max(x, np.float32(-80.0)), np.float32(80.0))
+    y = x * np.float32(1.44269504)
+    k = np.floor(y + np.float32(0.5))
+    r = (x - k * np.float32(0.693359375)) - k * np.float32(-2.12194440e-4)  # ln 2 in two parts
+    p = np.float32(1.0 / 720.0)
+    p = p * r + np.float32(1.0 / 120.0)
+    p = p * r + np.float32(1.0 / 24.0)
+    p = p * r + np.float32(1.0 / 6.0)
+    p = p * r + np.float32(0.5)
+    p = p * r + np.float32(1.0)
+    p = p * r + np.float32(1.0)
+    power: np.float32 = np.int32((np.int32(k) + np.int32(127)) << np.int32(23)).view(np.float32)
+    return p * power
+
+
+@inline_kernel
+def log32(x: np.float32) -> np.float32:
+    """log(x) for normal x > 0, error below 1e-6 of max(1, |log x|)."""
+    bits = np.float32(x).view(np.int32)
+    e = (bits >> np.int32(23)) - np.int32(127)
+    m = np.int32((bits & np.int32(0x7FFFFF)) | np.int32(0x3F800000)).view(np.float32)
+    high = m > np.float32(1.41421356)
+    m = m * np.float32(0.5) if high else m
+    k = np.float32(e) + (np.float32(1.0) if high else np.float32(0.0))
+    s = (m - np.float32(1.0)) / (m + np.float32(1.0))  # log m = 2 artanh s, |s| <= 0.172
+    z = s * s
+    p = np.float32(2.0 / 9.0)
+    p = p * z + np.float32(2.0 / 7.0)
+    p = p * z + np.float32(2.0 / 5.0)
+    p = p * z + np.float32(2.0 / 3.0)
+    p = p * z + np.float32(2.0)
+    return s * p + k * np.float32(0.69314718)
+
+
+@inline_kernel
+def sincos_turn32(word: np.uint32) -> tuple[np.float32, np.float32]:
+    """Sine and cosine of 2 pi (word + 0.5) / 2^32, absolute error below 3e-6."""
+    quadrant = np.int32(word >> np.uint32(30))
+    rest = np.float32(np.int32(word & np.uint32(0x3FFFFFFF)) - np.int32(0x20000000))
+    t = rest * np.float32(1.4629180792671596e-09)  # pi / 2^31: angle from the middle of the quadrant
+    z = t * t
+    s = t * (
+        np.float32(1.0)
+        + z * (np.float32(-1.0 / 6.0) + z * (np.float32(1.0 / 120.0) - z * np.float32(1.0 / 5040.0)))
+    )
+    c = np.float32(1.0) + z * (np.float32(-0.5) + z * (np.float32(1.0 / 24.0) - z * np.float32(1.0 / 720.0)))
+    # rotate by 45 degrees to the start of the quadrant, then by whole quadrants
+    half = np.float32(0.70710678)
+    a = half * (s + c)
+    b = half * (c - s)
+    sine = a if quadrant == 0 else (b if quadrant == 1 else (-a if quadrant == 2 else -b))
+    cosine = b if quadrant == 0 else (-a if quadrant == 1 else (-b if quadrant == 2 else a))
+    return sine, cosine
