@@ -134,7 +134,7 @@ def test_the_grid_is_the_field_at_its_nodes_and_near_it_between() -> None:
         grid = fitted.grids[level]
         assert grid is not None
         at_nodes, _ = fitted.predict(grid.nodes()[:9], level)
-        np.testing.assert_allclose(at_nodes, grid.mean[:9], rtol=1e-5)
+        np.testing.assert_allclose(at_nodes[:, grid.columns], grid.mean[:9], rtol=1e-5)
 
 
 def test_the_field_follows_the_truth_where_readings_were_censored() -> None:
@@ -163,7 +163,9 @@ def test_the_likelihood_is_student_t_plus_silence() -> None:
     want = []
     for node in nodes:
         total = 0.0
-        for z, mean, sigma in zip(rssi[0].astype(np.float32), grid.mean[node], grid.sigma[node], strict=True):
+        assert len(grid.columns) == 8
+        sigma = grid.sigma[node]
+        for z, mean in zip(rssi[0].astype(np.float32), grid.mean[node], strict=True):
             if np.isnan(z):
                 total += np.log(0.2 + 0.8 * norm.cdf((fitted.limit - mean) / sigma))
             else:
@@ -175,8 +177,8 @@ def test_the_likelihood_is_student_t_plus_silence() -> None:
 @pytest.mark.parametrize("n_aps", [1, 300])
 def test_the_kernel_equals_its_plain_twin(n_aps: int) -> None:
     rng = np.random.default_rng(5)
-    mean, sigma = rng.uniform(-100, -40, (30, n_aps)), rng.uniform(2, 9, (30, n_aps))
-    silence = rng.uniform(-3, 0, (30, n_aps))
+    mean, silence = rng.uniform(-100, -40, (30, n_aps)), rng.uniform(-3, 0, (30, n_aps))
+    sigma = rng.uniform(2, 9, 30)
     node, weight = rng.integers(0, 30, (11, 4)), rng.dirichlet(np.ones(4), 11)
     heard = np.flatnonzero(rng.random(n_aps) < 0.7) if n_aps > 1 else np.array([0])
     z = rng.uniform(-100, 100_000, len(heard))  # also absurd readings: no overflow
@@ -184,10 +186,33 @@ def test_the_kernel_equals_its_plain_twin(n_aps: int) -> None:
     total = tables[2].sum(axis=1, dtype=np.float64)
     got = np.empty(11)
     field_log_likelihood(node, weight, *tables, total, heard, z, 3.0, got)
-    m, s, q = (np.einsum("nk,nkh->nh", weight, t[node[:, :, None], heard[None, None]]) for t in tables)
+    m, q = (
+        np.einsum("nk,nkh->nh", weight, t[node[:, :, None], heard[None, None]])
+        for t in (tables[0], tables[2])
+    )
+    s = (weight * tables[1][node]).sum(axis=1)[:, None]
     tail = -2.0 * np.log1p(((z - m) / s) ** 2 / 3.0) - np.log(s)
     want = tail.sum(axis=1) + (weight * total[node]).sum(axis=1) - q.sum(axis=1)
     np.testing.assert_allclose(got, want, rtol=1e-5)
+
+
+def test_a_rare_access_point_counts_as_weak() -> None:
+    survey = made_up_survey()
+    rare = np.full((len(survey), 1), np.nan)
+    rare[0] = -60.0  # heard at one place: no field of its own
+    rssi = np.hstack([survey.dense(), rare])
+    more = Survey.from_dense(rssi, survey.xy, survey.floor, survey.floors)
+    noise = Noise(exponent=1.0)
+    fitted = gaussian_process.fit(more, limit=-85.0, noise=noise)
+    assert all(g is not None and 8 not in g.columns for g in fitted.grids)
+    query = queries(1)[2][0]
+    with_it, without = (
+        fitted.log_likelihood(fingerprint(more.bssid, np.append(query, z)), survey.xy[:5], survey.floor[:5])
+        for z in (-90.0, np.nan)
+    )
+    student = -2.0 * np.log1p((5.0 / 6.0) ** 2 / 3.0) - np.log(6.0)
+    silent = np.log(0.4 + 0.6 * norm.cdf(10.0 / 6.0))
+    np.testing.assert_allclose(with_it - without, student - silent, rtol=1e-6)
 
 
 def test_large_floors_are_thinned_and_wide_ones_get_a_coarser_grid() -> None:

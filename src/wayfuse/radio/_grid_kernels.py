@@ -30,23 +30,23 @@ def field_log_likelihood(
 ) -> None:
     """Write the log-likelihood of readings z (h,) of columns ``heard`` at places between nodes.
 
-    node, weight (N, 4): corners and bilinear weights; mean, sigma, silence (nodes, m), total_silence (nodes,).
-    Products of 1 + r^2 / dof and of sigma are carried along, so that a logarithm is rare.
+    node, weight (N, 4): corners and bilinear weights; mean, silence (nodes, a); sigma, total_silence (nodes,).
+    The product of 1 + r^2 / dof is carried along, so that a logarithm is rare.
     """
     for i in range(node.shape[0]):
         a, b, c, d = node[i, 0], node[i, 1], node[i, 2], node[i, 3]
         p, q, r, s = weight[i, 0], weight[i, 1], weight[i, 2], weight[i, 3]
         total = p * total_silence[a] + q * total_silence[b] + r * total_silence[c] + s * total_silence[d]
-        tails, spreads = 1.0, 1.0
+        spread = p * sigma[a] + q * sigma[b] + r * sigma[c] + s * sigma[d]
+        total -= heard.shape[0] * math.log(spread)
+        tails = 1.0
         for k in range(heard.shape[0]):
             j = heard[k]
             total -= p * silence[a, j] + q * silence[b, j] + r * silence[c, j] + s * silence[d, j]
             centre = p * mean[a, j] + q * mean[b, j] + r * mean[c, j] + s * mean[d, j]
-            spread = p * sigma[a, j] + q * sigma[b, j] + r * sigma[c, j] + s * sigma[d, j]
             x = (z[k] - centre) / spread
             tails *= 1.0 + x * x / dof
-            spreads *= spread
-            if tails > _LARGE or spreads > _LARGE:
-                total -= 0.5 * (dof + 1.0) * math.log(tails) + math.log(spreads)
-                tails, spreads = 1.0, 1.0
-        out[i] = total - 0.5 * (dof + 1.0) * math.log(tails) - math.log(spreads)
+            if tails > _LARGE:
+                total -= 0.5 * (dof + 1.0) * math.log(tails)
+                tails = 1.0
+        out[i] = total - 0.5 * (dof + 1.0) * math.log(tails)

@@ -21,33 +21,26 @@ Departs from [1]_: log-distance mean, shared kernel with two lengths, censoring,
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from wayfuse.core.types import Array, Array32, BoolArray, IdArray
-from wayfuse.radio.censoring import log_silence
-from wayfuse.radio.gp_fit import FloorField, fit_fields
+from wayfuse.core.types import Array, IdArray
+from wayfuse.radio.gp_fit import fit_fields
+from wayfuse.radio.gp_grid import FloorGrid, GridSize, grid_of, log_student
 from wayfuse.radio.gp_regression import Kernel
-from wayfuse.radio.radio_map import (
-    check_queries,
-    locate_one,
-    parts_error,
-    query_vector,
-    require,
-    require_readings,
-)
+from wayfuse.radio.radio_map import check_queries, locate_one, query_vector, require, require_readings
 from wayfuse.radio.survey import Fingerprint, Fix, Survey
 
-__all__ = ["FloorGrid", "GaussianProcessMap", "Noise", "fit"]
+__all__ = ["GaussianProcessMap", "Noise", "fit"]
 
-_MARGIN = 5.0  # m that the grid reaches beyond the survey
 _UNKNOWN_SIGMA = 6.0  # dB, of an access point that a floor heard too rarely for a field of its own
 _UNKNOWN_BELOW = 10.0  # dB below the limit of hearing: the mean of such an access point
-_BLOCK = 4096  # grid nodes predicted at a time
+_LIMIT_QUANTILE = 0.2  # weak readings are a lucky sample: hearing begins to fail well above the weakest
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,43 +69,6 @@ class Noise:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class FloorGrid:
-    """Field of one floor on grid nodes (r rows along y, c columns along x, node = row * c + column).
-
-    origin (2,) m of node 0; step m; shape (r, c); mean (r * c, m) dBm; sigma (r * c, m) dB of a query
-    reading; silence (r * c, m) log probability of not hearing; near (r * c,): close to a surveyed place.
-    """
-
-    origin: Array
-    step: float
-    shape: tuple[int, int]
-    mean: Array32
-    sigma: Array32
-    silence: Array32
-    near: BoolArray
-    total_silence: Array = field(init=False)
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "total_silence", self.silence.sum(axis=1, dtype=np.float64))
-
-    def nodes(self) -> Array:
-        """(r * c, 2) m: the places of the nodes."""
-        row, column = np.divmod(np.arange(self.shape[0] * self.shape[1]), self.shape[1])
-        return self.origin + self.step * np.column_stack([column, row])
-
-    def corners(self, xy: NDArray[np.floating]) -> tuple[NDArray[np.int64], Array]:
-        """Nodes (N, 4) around places (N, 2), bilinear weights (N, 4); places outside move to the edge."""
-        rows, columns = self.shape
-        at = np.clip((np.asarray(xy, np.float64) - self.origin) / self.step, 0.0, [columns - 1, rows - 1])
-        low = np.minimum(at.astype(np.int64), [max(columns - 2, 0), max(rows - 2, 0)])
-        u, v = (at - low).T
-        right, up = np.minimum(low[:, 0] + 1, columns - 1), np.minimum(low[:, 1] + 1, rows - 1)
-        x, y = (low[:, 0], right, low[:, 0], right), (low[:, 1], low[:, 1], up, up)
-        node = np.stack([j * columns + i for i, j in zip(x, y, strict=True)], axis=1)
-        return node, np.stack([(1 - u) * (1 - v), u * (1 - v), (1 - u) * v, u * v], axis=1)
-
-
-@dataclass(frozen=True, slots=True, eq=False)
 class GaussianProcessMap:
     """Fitted map: bssid (m,), floors, one grid per floor (None: not surveyed), kernel, noise, limit (dBm)."""
 
@@ -125,41 +81,42 @@ class GaussianProcessMap:
 
     def predict(self, xy: NDArray[np.floating], floor: int) -> tuple[Array, Array]:
         """Mean (N, m) dBm and standard deviation (N, m) dB of a reading at places (N, 2) m of one floor."""
+        mean = np.full((len(xy), len(self.bssid)), self.limit - _UNKNOWN_BELOW)
+        sigma = np.full_like(mean, _UNKNOWN_SIGMA)
         grid = self.grids[floor]
-        if grid is None:
-            low = np.full((len(xy), len(self.bssid)), self.limit - _UNKNOWN_BELOW)
-            return low, np.full_like(low, _UNKNOWN_SIGMA)
-        node, weight = grid.corners(xy)
-        mean = np.einsum("nk,nkm->nm", weight, grid.mean[node])
-        sigma = np.einsum("nk,nkm->nm", weight, grid.sigma[node])
+        if grid is not None:
+            node, weight = grid.corners(xy)
+            mean[:, grid.columns] = np.einsum("nk,nkm->nm", weight, grid.mean[node])
+            sigma[:, grid.columns] = (weight * grid.sigma[node]).sum(axis=1)[:, None]
         return mean, sigma
 
-    def _log_node(self, grid: FloorGrid, z: Array, heard: NDArray[np.int64]) -> Array:
-        """Tempered log-likelihood of readings z (h,) of columns ``heard`` at the nodes near a place."""
-        nodes = np.flatnonzero(grid.near)
-        at = np.ix_(nodes, heard)
-        log_p = _log_student(z, grid.mean[at], grid.sigma[at], self.noise.dof)
-        silent = grid.total_silence[nodes] - grid.silence[at].sum(axis=1, dtype=np.float64)
-        return np.asarray(self.noise.exponent * (log_p + silent))
+    def _rest(self, z: Array, n_columns: int) -> float:
+        """Log-likelihood of the access points without a field on a floor: readings z (h,), silence of the rest."""
+        unknown = np.full((1, len(z)), self.limit - _UNKNOWN_BELOW)
+        below = 0.5 * (1.0 + math.erf(_UNKNOWN_BELOW / _UNKNOWN_SIGMA / math.sqrt(2.0)))
+        silent = math.log(self.noise.dropout + (1.0 - self.noise.dropout) * below)
+        heard = log_student(z, unknown, np.array([[_UNKNOWN_SIGMA]]), self.noise.dof)
+        return float(heard[0]) + (n_columns - len(z)) * silent
 
     def locate_all(self, rssi: NDArray[np.floating]) -> tuple[Array, NDArray[np.int32]]:
         """xy (q, 2) m and floor (q,) of queries (q, m) dBm: the posterior mean on the most probable floor."""
         queries = check_queries(rssi, len(self.bssid)).astype(np.float64)
-        places = [None if g is None else g.nodes()[g.near] for g in self.grids]
+        floors = [(level, g, g.nodes()[g.near]) for level, g in enumerate(self.grids) if g is not None]
         xy, floor = np.zeros((len(queries), 2)), np.zeros(len(queries), np.int32)
         for q, query in enumerate(queries):
             heard = np.flatnonzero(np.isfinite(query))
-            best = -np.inf
-            for level, grid in enumerate(self.grids):
-                if grid is None:
-                    continue
-                log_p = self._log_node(grid, query[heard], heard)
+            z, best = query[heard], -np.inf
+            for level, grid, places in floors:
+                own, known = grid.split(heard)
+                log_p = grid.at_near_nodes(z[known], own, self.noise.dof)
+                log_p += self._rest(z[~known], len(self.bssid) - len(grid.columns))
+                log_p *= self.noise.exponent
                 top = float(log_p.max())
                 weight = np.exp(log_p - top)
                 evidence = top + float(np.log(weight.sum() * grid.step**2))
                 if evidence > best:
                     best, floor[q] = evidence, level
-                    xy[q] = weight @ places[level] / weight.sum()
+                    xy[q] = weight @ places / weight.sum()
         return xy, floor
 
     def locate(self, fingerprint: Fingerprint) -> Fix:
@@ -174,8 +131,6 @@ class GaussianProcessMap:
         Beyond the grid the value of its edge holds; on a floor without a survey every access point counts as
         too weak to hear.
         """
-        from wayfuse.radio._grid_kernels import field_log_likelihood
-
         vector = query_vector(self.bssid, fingerprint).astype(np.float64)
         heard = np.flatnonzero(np.isfinite(vector))
         out = np.zeros(len(xy))
@@ -186,62 +141,41 @@ class GaussianProcessMap:
             here = np.flatnonzero(levels == level)
             grid = self.grids[level] if 0 <= level < len(self.grids) else None
             if grid is None:
-                mean, sigma = np.full((1, len(z)), self.limit - _UNKNOWN_BELOW), np.array([[_UNKNOWN_SIGMA]])
-                out[here] = _log_student(z, mean, sigma, self.noise.dof)[0]
+                out[here] = self._rest(z, len(self.bssid))
                 continue
-            node, weight = grid.corners(places[here])
-            part = np.empty(len(here))
-            tables = (grid.mean, grid.sigma, grid.silence, grid.total_silence)
-            field_log_likelihood(node, weight, *tables, heard, z, self.noise.dof, part)
-            out[here] = part
+            own, known = grid.split(heard)
+            rest = self._rest(z[~known], len(self.bssid) - len(grid.columns))
+            out[here] = grid.at_places(z[known], own, places[here], self.noise.dof) + rest
         return self.noise.exponent * out
 
     def parts(self) -> tuple[str, Mapping[str, Any], Mapping[str, NDArray[Any]]]:
         """Kind, parameters and arrays for `wayfuse.radio.archive.save`."""
         n = self.noise
-        noise = {"session_sigma": n.session_sigma, "dof": n.dof, "dropout": n.dropout, "exponent": n.exponent}
-        header: dict[str, Any] = {"floors": list(self.floors), "kernel": list(self.kernel), "noise": noise}
+        header = {
+            "floors": list(self.floors),
+            "surveyed": [grid is not None for grid in self.grids],
+            "kernel": list(self.kernel),
+            "noise": [n.session_sigma, n.dof, n.dropout, n.exponent],
+            "limit": self.limit,
+        }
         arrays: dict[str, NDArray[Any]] = {"bssid": self.bssid}
-        steps: list[float | None] = []
         for level, grid in enumerate(self.grids):
-            steps.append(None if grid is None else grid.step)
             if grid is not None:
-                arrays[f"shape_{level}"] = np.array(grid.shape, np.int64)
-                for name in _GRID_ARRAYS:
-                    arrays[f"{name}_{level}"] = getattr(grid, name)
-        return "gaussian_process", {**header, "steps": steps, "limit": self.limit}, arrays
+                arrays |= grid.parts(level)
+        return "gaussian_process", header, arrays
 
     @classmethod
     def from_parts(cls, header: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]]) -> GaussianProcessMap:
         """The map of what `parts` gave; `ValueError` where they do not fit."""
-        m = len(arrays["bssid"])
-        grids: list[FloorGrid | None] = []
-        for level, step in enumerate(header["steps"]):
-            if step is None:
-                grids.append(None)
-                continue
-            rows, columns = arrays[f"shape_{level}"].tolist()
-            tables = {name: arrays[f"{name}_{level}"] for name in _GRID_ARRAYS}
-            shapes = dict.fromkeys(_GRID_ARRAYS, (rows * columns, m)) | {
-                "origin": (2,),
-                "near": (rows * columns,),
-            }
-            if fault := parts_error(tables, shapes, "ffffb"):
-                raise ValueError(fault)
-            grids.append(FloorGrid(step=float(step), shape=(rows, columns), **tables))
-        floors, kernel, noise = tuple(header["floors"]), Kernel(*header["kernel"]), Noise(**header["noise"])
-        return cls(arrays["bssid"], floors, tuple(grids), kernel, noise, float(header["limit"]))
-
-
-_GRID_ARRAYS = ("origin", "mean", "sigma", "silence", "near")
-
-
-def _log_student(z: Array, mean: NDArray[np.floating], sigma: NDArray[np.floating], dof: float) -> Array:
-    """(N,) log density of independent Student-t readings z (h,) around mean (N, h), constants dropped."""
-    r = (z - mean) / sigma
-    return np.asarray(
-        (-0.5 * (dof + 1.0) * np.log1p(r * r / dof) - np.log(sigma)).sum(axis=1, dtype=np.float64)
-    )
+        bssid, floors, surveyed = arrays["bssid"], tuple(header["floors"]), header["surveyed"]
+        if bssid.dtype != np.uint64 or bssid.ndim != 1 or len(surveyed) != len(floors):
+            raise ValueError("bssid or floors")
+        grids = tuple(
+            FloorGrid.from_parts(arrays, level, len(bssid)) if there else None
+            for level, there in enumerate(surveyed)
+        )
+        kernel, noise = Kernel(*header["kernel"]), Noise(*header["noise"])
+        return cls(bssid, floors, grids, kernel, noise, float(header["limit"]))
 
 
 def fit(
@@ -276,42 +210,7 @@ def fit(
     noise = Noise() if noise is None else noise
     threshold = float(np.quantile(survey.rssi, _LIMIT_QUANTILE)) if limit is None else float(limit)
     fields, fitted = fit_fields(survey, threshold, noise.dropout, max_points, kernel)
-    grids = tuple(
-        None if f is None else _grid(f, len(survey.bssid), fitted, noise, threshold, step, reach, max_nodes)
-        for f in fields
-    )
+    spread = math.hypot(fitted.noise, noise.session_sigma)
+    sizes = GridSize(step, reach, max_nodes)
+    grids = tuple(None if f is None else grid_of(f, spread, threshold, noise.dropout, sizes) for f in fields)
     return GaussianProcessMap(survey.bssid, survey.floors, grids, fitted, noise, threshold)
-
-
-_LIMIT_QUANTILE = 0.2  # weak readings are a lucky sample: hearing begins to fail well above the weakest
-
-
-def _grid(
-    floor: FloorField,
-    n_columns: int,
-    kernel: Kernel,
-    noise: Noise,
-    limit: float,
-    step: float,
-    reach: float,
-    max_nodes: int,
-) -> FloorGrid:
-    """Mean, spread and silence of all access points on the grid of a floor."""
-    low, high = floor.xy.min(axis=0) - _MARGIN, floor.xy.max(axis=0) + _MARGIN
-    spacing = max(step, float(np.sqrt(np.prod(high - low) / max_nodes)))
-    columns, rows = (np.ceil((high - low) / spacing).astype(int) + 1).tolist()
-    row, column = np.divmod(np.arange(rows * columns), columns)
-    nodes = low + spacing * np.column_stack([column, row])
-    mean = np.full((len(nodes), n_columns), limit - _UNKNOWN_BELOW, np.float32)
-    sigma = np.full((len(nodes), n_columns), _UNKNOWN_SIGMA, np.float32)
-    near = np.zeros(len(nodes), np.bool_)
-    for start in range(0, len(nodes), _BLOCK):
-        part = slice(start, start + _BLOCK)
-        value, spread = floor.predict(nodes[part])
-        mean[part, floor.columns] = value
-        whole = np.sqrt(spread**2 + kernel.noise**2 + noise.session_sigma**2)
-        sigma[part, floor.columns] = whole[:, None]
-        squared = ((nodes[part, None] - floor.xy[None]) ** 2).sum(axis=-1)
-        near[part] = squared.min(axis=1) <= max(reach, spacing) ** 2
-    silence = log_silence(mean, sigma, limit, noise.dropout).astype(np.float32)
-    return FloorGrid(low, spacing, (rows, columns), mean, sigma, silence, near)
