@@ -27,8 +27,8 @@ def exp32(x: np.float32) -> np.float32:
     p = p * r + np.float32(0.5)
     p = p * r + np.float32(1.0)
     p = p * r + np.float32(1.0)
-    power: np.float32 = np.int32((np.int32(k) + np.int32(127)) << np.int32(23)).view(np.float32)
-    return p * power
+    bits = (np.int32(k) + np.int32(127)) << np.int32(23)
+    return np.float32(p * np.int32(bits).view(np.float32))
 
 
 @inline_kernel

@@ -30,10 +30,14 @@ from wayfuse.tracking.particle_engine import ParticleEngine, ParticleState, Reco
 from wayfuse.tracking.summary import Summary
 from wayfuse.tracking.tracker import Tracker
 
-__all__ = ["BAND_2_4", "BAND_5", "Config", "build", "check_floors", "prior_estimate"]
+__all__ = ["BAND_2_4", "BAND_5", "CALIBRATED", "Config", "build", "check_floors", "prior_estimate"]
 
 BAND_2_4 = ((2400, 2500),)  # MHz
 BAND_5 = ((4900, 5925),)
+
+
+# radius = offset + scale * quantile of the cloud, by quantile regression of the error at 1 Hz on the three folds
+CALIBRATED = Summary(offset_68=0.84, scale_68=0.89, offset_95=1.73, scale_95=1.06)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -60,7 +64,7 @@ class Config:
     diffusion: float = 1.2  # m per root second, where motion sensors are silent
     map_constraint: Literal["walkable", "barriers", "none"] = "walkable"
     use_steps: bool = True
-    summary: Summary = field(default_factory=Summary)
+    summary: Summary = field(default_factory=lambda: CALIBRATED)
 
 
 def build(
