@@ -19,5 +19,5 @@ def warmup() -> None:
 
     start = time.process_time()
     with tempfile.TemporaryDirectory() as folder:
-        run_demo(Path(folder), 0, scenario=smallest(), quiet=True)
+        run_demo(Path(folder), 0, scenario=smallest(), quiet=True, pictures=False)
     click.echo(f"kernels compiled ({time.process_time() - start:.1f} s CPU)")

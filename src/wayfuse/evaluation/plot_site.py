@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from matplotlib.path import Path as Outline
 
-__all__ = ["ABOVE", "draw_floor", "floor_figure", "save_figure"]
+__all__ = ["ABOVE", "draw_floor", "draw_names", "floor_figure", "save_figure"]
 
 ABOVE = 10.0  # z-order from which callers draw over the plan
 
@@ -48,7 +48,9 @@ FONT_SIZES = (8.0, 7.0, 6.0, 5.0, 4.2)  # pt, tried in turn
 CLEAR, GLYPH_HEIGHT = 1.1, 1.15  # a name needs this much of its own width, of its font size in height
 
 
-def draw_floor(ax: Axes, floor: Floor, *, walkable: bool = False, names: bool = True) -> None:
+def draw_floor(
+    ax: Axes, floor: Floor, *, walkable: bool = False, names: bool = True, scale: bool = True
+) -> None:
     """Draw a floor into axes, in metres of its frame, and set their limits and equal aspect.
 
     Parameters
@@ -56,6 +58,7 @@ def draw_floor(ax: Axes, floor: Floor, *, walkable: bool = False, names: bool = 
     ax : axes of a figure whose size is final (names are fitted to it).
     walkable : tint the walkable cells.
     names : write the names of units where they fit.
+    scale : draw a scale bar below the plan.
     """
     from matplotlib.collections import LineCollection, PathCollection
 
@@ -74,11 +77,12 @@ def draw_floor(ax: Axes, floor: Floor, *, walkable: bool = False, names: bool = 
     )
     ax.add_collection(LineCollection(_segments(floor.walls), colors=WALL, linewidths=0.5, zorder=3.0))
     ax.add_collection(PathCollection(ground, facecolors="none", edgecolors=EDGE, linewidths=1.1, zorder=4.0))
-    _scale_bar(ax, floor)
+    if scale:
+        _scale_bar(ax, floor)
     if floor.anchor is not None:
         _north(ax, 0.5 * np.pi - floor.anchor.rotation)
     if names:
-        _names(ax, floor)
+        draw_names(ax, floor)
 
 
 def floor_figure(floor: Floor, title: str = "", *, walkable: bool = True, width: float = 12.0) -> Figure:
@@ -168,11 +172,11 @@ def _scale_bar(ax: Axes, floor: Floor) -> None:
     ax.plot([x, x + length], [y, y], color=INK, lw=2.0, solid_capstyle="butt", zorder=6.0)
     ax.annotate(
         f"{length:g} m",
-        (x + 0.5 * length, y),
-        (0, 3),
+        (x, y),
+        (-4, 0),
         textcoords="offset points",
-        ha="center",
-        va="bottom",
+        ha="right",
+        va="center",
         fontsize=8,
         color=INK,
         zorder=6.0,
@@ -205,8 +209,8 @@ def _north(ax: Axes, direction: float) -> None:
     )
 
 
-def _names(ax: Axes, floor: Floor) -> None:
-    """Write each name at the largest size that fits its unit, level or upright; leave out the rest."""
+def draw_names(ax: Axes, floor: Floor) -> None:
+    """Write each name at the largest size that fits its unit and the axes' limits; leave out the rest."""
     from matplotlib.font_manager import FontProperties, findfont, get_font
     from matplotlib.textpath import TextPath
 
@@ -218,7 +222,7 @@ def _names(ax: Axes, floor: Floor) -> None:
             continue
         across = TextPath((0.0, 0.0), _literal(unit.name), size=1.0).get_extents().width
         fit = _fit(unit, across * CLEAR, metres_per_point)
-        if fit is not None:
+        if fit is not None and _is_inside(ax, fit, across * metres_per_point):
             x, y, size, turn = fit
             ax.text(
                 x,
@@ -235,6 +239,15 @@ def _names(ax: Axes, floor: Floor) -> None:
                 clip_on=True,
                 zorder=5.0,
             )
+
+
+def _is_inside(ax: Axes, fit: tuple[float, float, float, float], width: float) -> bool:
+    """Whether a name of ``width`` (m per pt of size) lies within the limits of the axes whole."""
+    x, y, size, turn = fit
+    angle = np.deg2rad(turn)
+    half = 0.5 * width * size * np.abs([np.cos(angle), np.sin(angle)])
+    (left, right), (low, high) = sorted(ax.get_xlim()), sorted(ax.get_ylim())
+    return bool(left <= x - half[0] and x + half[0] <= right and low <= y - half[1] and y + half[1] <= high)
 
 
 def _literal(text: str) -> str:

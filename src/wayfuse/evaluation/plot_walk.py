@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from wayfuse.core.types import Array
+from wayfuse.core.types import Array, BoolArray
 from wayfuse.evaluation.errors import MethodScores, Scores, places_in_frame, summarise
 from wayfuse.evaluation.estimates_file import WalkEstimates
 from wayfuse.evaluation.plots import INK, new_figure, shown, style
@@ -29,6 +29,7 @@ _MAX_PANELS = 4
 _MARGIN, _LEAST = 6.0, 24.0  # m around what is shown, and the least extent shown
 _N_ELLIPSES = 7  # per method and walk
 _RHO95 = 2.4477468306808166  # radius in standard deviations that holds 95 % of a Gaussian in the plane
+_ROW, _AROUND = 0.19, 0.85  # inches: a row of the legend, the titles and labels of the axes
 _OVER = 10.0  # z-order of what lies over the plan
 _TRUTH = "#111111"
 
@@ -38,7 +39,8 @@ def walk_figure(scores: Scores, walk: str, site: Site | None = None) -> Figure:
     truth = scores.truths[walk]
     names = list(dict.fromkeys(truth.floor.tolist()))[:_MAX_PANELS]
     boxes = [_window(scores, truth, name) for name in names]
-    figure = new_figure(*_size(boxes))
+    width, height = _size(boxes)
+    figure = new_figure(width, height)
     for k, (name, box) in enumerate(zip(names, boxes, strict=True)):
         ax = figure.add_subplot(1, len(names), k + 1)
         _plan(ax, site, name, truth, box)
@@ -52,7 +54,8 @@ def walk_figure(scores: Scores, walk: str, site: Site | None = None) -> Figure:
     first.set_title(
         f"{title}\n{first.get_title(loc='left')}", loc="left", fontsize=10, color=INK, parse_math=False
     )
-    _legend(figure)
+    rows = _legend(figure)
+    figure.set_size_inches(width, height + _ROW * rows)
     return figure
 
 
@@ -61,7 +64,7 @@ def _size(boxes: list[tuple[Array, Array]]) -> tuple[float, float]:
     low, high = boxes[0]
     ratio = float(np.clip((high[1] - low[1]) / (high[0] - low[0]), 0.45, 1.5))
     width = 9.0 if len(boxes) == 1 else 5.6 * len(boxes)
-    return width, width / len(boxes) * ratio + 1.1
+    return width, width / len(boxes) * ratio + _AROUND
 
 
 def _shift(scores: Scores, floor: str) -> Array:
@@ -71,6 +74,11 @@ def _shift(scores: Scores, floor: str) -> Array:
 
 def _track(method: MethodScores, walk: str) -> WalkEstimates | None:
     return next((track for track in method.tracks if track.walk == walk), None)
+
+
+def _informed(track: WalkEstimates) -> BoolArray:
+    """Rows that rest on more than the building: before its first scan a tracker states the middle of it."""
+    return np.asarray(track.states() != "initialising")
 
 
 def _true_floor(truth: Truth, t: Array) -> NDArray[np.str_]:
@@ -85,7 +93,7 @@ def _window(scores: Scores, truth: Truth, floor: str) -> tuple[Array, Array]:
         track = _track(method, truth.walk)
         xy = None if track is None else places_in_frame(track, truth, scores.frame)
         if track is not None and xy is not None:
-            here = xy[_true_floor(truth, track.t) == floor] + shift
+            here = xy[_informed(track) & (_true_floor(truth, track.t) == floor)] + shift
             if len(here):
                 places.append(np.percentile(here, (5, 95), axis=0))  # an outlier is not to shrink the rest
     every = np.concatenate(places)
@@ -98,9 +106,9 @@ def _plan(ax: Axes, site: Site | None, name: str, truth: Truth, box: tuple[Array
     """Floor plan, or an empty sheet in metres, zoomed to the box, with a scale bar."""
     floor = _floor(site, name) if truth.plane is None else None
     if floor is not None:
-        from wayfuse.evaluation.plot_site import draw_floor
+        from wayfuse.evaluation.plot_site import draw_floor, draw_names
 
-        draw_floor(ax, floor)
+        draw_floor(ax, floor, names=False, scale=False)
     else:
         ax.grid(visible=True, color="#e4e4e4", linewidth=0.5)
         ax.tick_params(labelsize=8)
@@ -113,6 +121,8 @@ def _plan(ax: Axes, site: Site | None, name: str, truth: Truth, box: tuple[Array
     ax.set_aspect("equal")
     ax.set_xlim(box[0][0], box[1][0])
     ax.set_ylim(box[0][1], box[1][1])
+    if floor is not None:
+        draw_names(ax, floor)
     ax.set_title(
         f"floor {name}" if name else "floor unknown", loc="left", fontsize=10, color=INK, parse_math=False
     )
@@ -164,7 +174,7 @@ def _estimates(ax: Axes, scores: Scores, method: MethodScores, index: int, truth
         return
     xy = xy + _shift(scores, floor)
     look = style(index) | ({} if index == 0 else {"linewidth": 1.2, "alpha": 0.8})
-    here = _true_floor(truth, track.t) == floor
+    here = _informed(track) & (_true_floor(truth, track.t) == floor)
     right = scores.frame.steps(track.floor, np.full(len(track), floor)) == 0
     right = right | (floor == "")
     label = f"{shown(method.name)}: {_error_text(scores, method, truth.walk)}"
@@ -189,9 +199,10 @@ def _ellipses(ax: Axes, track: WalkEstimates, xy: Array, here: Any, colour: str,
     from matplotlib.patches import Ellipse
 
     xx, yy, cross = (track.number(name) for name in ("var_x", "var_y", "cov_xy"))
-    rows = np.unique(np.linspace(0, len(track) - 1, _N_ELLIPSES).round().astype(int))
+    given = np.flatnonzero(here)
+    rows = given[np.unique(np.linspace(0, len(given) - 1, min(_N_ELLIPSES, len(given))).round().astype(int))]
     drawn = False
-    for i in rows[here[rows]]:
+    for i in rows:
         matrix = np.array([[xx[i], cross[i]], [cross[i], yy[i]]])
         if not np.all(np.isfinite(matrix)):
             continue
@@ -200,7 +211,7 @@ def _ellipses(ax: Axes, track: WalkEstimates, xy: Array, here: Any, colour: str,
             continue
         width, height = 2.0 * _RHO95 * np.sqrt(values[::-1])
         angle = float(np.degrees(np.arctan2(vectors[1, 1], vectors[0, 1])))
-        look = {"facecolor": "none", "edgecolor": colour, "linewidth": 0.9, "alpha": 0.75}
+        look = {"facecolor": "none", "edgecolor": colour, "linewidth": 0.9, "alpha": 0.55}
         ax.add_patch(Ellipse(tuple(xy[i]), width, height, angle=angle, zorder=_OVER + 2, **look))
         ax.plot(*xy[i], "o", color=colour, markersize=4, zorder=_OVER + 4)
         drawn = True
@@ -225,7 +236,8 @@ def _error_text(scores: Scores, method: MethodScores, walk: str) -> str:
     return f"mean {of.mean:.1f} m, median {of.p50:.1f} m{floor}"
 
 
-def _legend(figure: Figure) -> None:
+def _legend(figure: Figure) -> int:
+    """Legend below the panels; its number of rows."""
     entries: dict[str, Any] = {}
     for ax in figure.axes:
         handles, labels = ax.get_legend_handles_labels()
@@ -235,3 +247,4 @@ def _legend(figure: Figure) -> None:
     )
     for text in legend.get_texts():
         text.set_parse_math(False)
+    return (len(entries) + 1) // 2

@@ -10,7 +10,7 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 from itertools import count, pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -41,6 +41,7 @@ COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#7
 DASHES: tuple[Any, ...] = ("-", (0, (5, 1.6)), (0, (1.4, 1.2)), (0, (6, 1.4, 1.4, 1.4)))
 INK, FAINT = "#333333", "#d9d9d9"
 LEVELS = (50, 75, 95)  # % marked in the distribution
+_FAR = 1e6  # m, beyond any plot: a distribution goes on at 100 %
 _MIN_POINTS = 10  # per span of time; fewer make no figure
 
 
@@ -81,11 +82,22 @@ def shown(name: str) -> str:
     return f" {name}" if name.startswith("_") else name
 
 
-def _legend(ax: Axes, where: Literal["lower right", "upper right", "upper left"]) -> None:
+def _legend(ax: Axes) -> None:
+    """Legend where a distribution leaves room."""
     if not ax.get_legend_handles_labels()[0]:
         return
     look: dict[str, Any] = {"fontsize": 8.5, "framealpha": 0.92, "edgecolor": FAINT}
-    for text in ax.legend(loc=where, **look).get_texts():
+    for text in ax.legend(loc="lower right", **look).get_texts():
+        text.set_parse_math(False)
+
+
+def _legend_below(figure: Figure, ax: Axes, columns: int) -> None:
+    """Legend of one of the axes below all of them, where it hides nothing."""
+    handles, labels = ax.get_legend_handles_labels()
+    if not handles:
+        return
+    look: dict[str, Any] = {"fontsize": 8.5, "frameon": False, "ncols": min(columns, len(handles))}
+    for text in figure.legend(handles, labels, loc="outside lower left", **look).get_texts():
         text.set_parse_math(False)
 
 
@@ -102,8 +114,8 @@ def cdf_figure(scores: Scores, missing: str = "skip") -> Figure:
         share = np.arange(1, len(error) + 1) / len(error)
         label = f"{shown(method.name)}: mean {error.mean():.2f} m, median {np.median(error):.2f} m"
         ax.plot(
-            np.insert(error, 0, 0.0),
-            100 * np.insert(share, 0, 0.0),
+            [0.0, *error, _FAR],
+            [0.0, *(100 * share), 100.0],
             drawstyle="steps-post",
             label=label,
             **style(k),
@@ -122,7 +134,7 @@ def cdf_figure(scores: Scores, missing: str = "skip") -> Figure:
     n = max((len(points) for _, points in _used(scores, missing)), default=0)
     title = f"Horizontal error at 1 Hz: {len(scores.walks)} walks, {n} points"
     _axes(ax, "horizontal error (m)", "share of points with at most this error (%)", title)
-    _legend(ax, "lower right")
+    _legend(ax)
     return figure
 
 
@@ -158,21 +170,14 @@ def error_by_time_figure(scores: Scores, missing: str = "skip") -> Figure:
     for k, (method, points) in enumerate(used):
         look = style(k)
         at, median = _binned(points, edges, lambda p: float(np.median(p.error)))
-        ax.plot(at, median, marker="o", markersize=4, label=f"{shown(method.name)}: median", **look)
+        ax.plot(at, median, marker="o", markersize=4, label=shown(method.name), **look)
         at, mean = _binned(points, edges, lambda p: float(np.mean(p.error)))
         thin = look | {"linewidth": 1.0}
-        ax.plot(
-            at,
-            mean,
-            marker="o",
-            markersize=4,
-            markerfacecolor="white",
-            label=f"{shown(method.name)}: mean",
-            **thin,
-        )
+        ax.plot(at, mean, marker="o", markersize=4, markerfacecolor="white", **thin)
     ax.set_ylim(bottom=0.0)
-    _axes(ax, "", "horizontal error (m)", "Error since the first Wi-Fi scan, at 1 Hz")
-    _legend(ax, "upper right")
+    title = "Error at 1 Hz since the first Wi-Fi scan: median (thick), mean (thin, open marks)"
+    _axes(ax, "", "horizontal error (m)", title)
+    _legend_below(figure, ax, 5)
     widest = max((p for _, p in used), key=len)
     going = [len(np.unique(widest.walk[(widest.since_start >= a) & (widest.since_start < b)]))
              for a, b in pairwise(edges)]  # fmt: skip
@@ -207,13 +212,10 @@ def calibration_figure(scores: Scores, missing: str = "skip") -> Figure | None:
         within = [100 * float(np.mean(points.error <= r)) for r in (points.r68, points.r95)]
         left.plot((68, 95), within, "o", color=look["color"], markeredgecolor="white", markersize=7, zorder=5)
         at, worst = _binned(points, edges, lambda p: float(np.percentile(p.error, 95)))
-        right.plot(
-            at, worst, marker="o", markersize=4, label=f"{shown(method.name)}: 95 % of errors below", **look
-        )
+        right.plot(at, worst, marker="o", markersize=4, **look)
         at, radius = _binned(points, edges, lambda p: float(np.mean(p.r95)))
         thin = look | {"linewidth": 1.0}
-        right.plot(at, radius, marker="D", markersize=4, markerfacecolor="white",
-                   label=f"{shown(method.name)}: mean r95 stated", **thin)  # fmt: skip
+        right.plot(at, radius, marker="D", markersize=4, markerfacecolor="white", **thin)
     left.set_xlim(0, 100)
     left.set_ylim(0, 100)
     left.set_aspect("equal")
@@ -223,9 +225,9 @@ def calibration_figure(scores: Scores, missing: str = "skip") -> Figure | None:
         left.axvline(mark, color="#8c8c8c", linewidth=0.8, linestyle=(0, (2, 3)), zorder=1)
     right.set_xlim(edges[0], edges[-1])
     right.set_ylim(bottom=0.0)
-    _axes(right, "time since the first Wi-Fi scan (s)", "radius (m)", "Stated r95 and what it should be")
-    _legend(left, "upper left")
-    _legend(right, "upper right")
+    title = "Radius of 95 % of the errors (thick), mean r95 stated (thin, open)"
+    _axes(right, "time since the first Wi-Fi scan (s)", "radius (m)", title)
+    _legend_below(figure, left, 8)
     return figure
 
 

@@ -19,7 +19,7 @@ from wayfuse.simulator.recordings import write_recording, write_site
 from wayfuse.simulator.scenario import Scenario
 from wayfuse.simulator.simulate import EPOCH_MS, SimulatedSite, Truth, make_site, simulate_walk
 
-__all__ = ["DemoFiles", "demo_name", "write_demo"]
+__all__ = ["DemoFiles", "demo_name", "smallest", "write_demo"]
 
 _WALK_EVERY_MS = 180_000
 
@@ -32,6 +32,11 @@ class DemoFiles:
     survey: tuple[Path, ...]
     walks: tuple[Path, ...]
     truth: dict[str, Truth]
+
+
+def smallest() -> Scenario:
+    """The least that runs every part: one survey walk on each floor and one walk to track."""
+    return Scenario(survey_walks=2, test_walks=1, duration_s=(20.0, 25.0))
 
 
 def write_demo(folder: Path, seed: int, scenario: Scenario | None = None) -> DemoFiles:
