@@ -64,7 +64,7 @@ class ScanState(NamedTuple):
     rssi: Array32
     frequency: NDArray[np.int32]
     heard: Array
-    last: tuple[bytes, bytes]
+    last: tuple[bytes, bytes, bytes]
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,17 +86,17 @@ class ScanBuffer:
             nothing.astype(np.float32),
             nothing.astype(np.int32),
             nothing,
-            (b"", b""),
+            (b"", b"", b""),
         )
 
     def step(self, state: ScanState, scan: WifiScan) -> tuple[ScanState, Fingerprint | None]:
         """Take a delivered scan; the fingerprint of now, or None where the scan says nothing new.
 
         A scan says nothing new when no reading is younger than ``max_age``, or when it repeats the scan before
-        reading by reading although it does not say when they were heard (a throttled phone).
+        reading by reading (a throttled phone, or a record delivered twice).
         """
-        signature = scan.bssid.tobytes(), scan.rssi.tobytes()
-        if signature == state.last and not np.any(np.isfinite(scan.last_seen)):
+        signature = scan.bssid.tobytes(), scan.rssi.tobytes(), scan.last_seen.tobytes()
+        if signature == state.last:
             return state, None
         heard = _heard(scan)
         # NaN compares false, so a reading that is not a number is not valid
