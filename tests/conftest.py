@@ -3,9 +3,15 @@
 from __future__ import annotations
 
 import os
+from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
+
+from wayfuse.maps.site import Site
+from wayfuse.radio.survey import Survey
+from wayfuse.sensors.recording import Recording
+from wayfuse.simulator.simulate import Truth
 
 
 @pytest.fixture(scope="session")
@@ -24,3 +30,37 @@ def ms_indoor(data_root: Path) -> Path:
     if not site.is_dir():
         pytest.skip(f"REAL DATA ABSENT: no folder {site}; fetch with `wayfuse datasets fetch ms-indoor`")
     return site
+
+
+@dataclass(frozen=True)
+class SmallWorld:
+    """A simulated site as a user has it: files in the ms-indoor layout, the site and radio map made of them.
+
+    ``folder`` holds site/ (plans), survey/, walks/, SITE (imported) and map.npz. walks : recordings read back.
+    """
+
+    folder: Path
+    site: Site
+    survey: Survey
+    walks: tuple[Recording, ...]
+    truth: dict[str, Truth]
+
+
+@pytest.fixture(scope="session")
+def world(tmp_path_factory: pytest.TempPathFactory) -> SmallWorld:
+    """One small simulated world for all tests that track; nobody writes into it."""
+    from wayfuse.formats.reading import read
+    from wayfuse.maps.importers.ms_indoor import import_site
+    from wayfuse.models.survey_walk import survey_walk
+    from wayfuse.radio.walk_survey import SurveyParameters, WalkRadioMap, survey_from_walks
+    from wayfuse.simulator.demo import write_demo
+    from wayfuse.simulator.scenario import Scenario
+
+    folder = tmp_path_factory.mktemp("world")
+    files = write_demo(folder, 3, Scenario(survey_walks=16, test_walks=4, duration_s=(25.0, 35.0)))
+    site, _ = import_site(files.site)
+    site.save(folder / "SITE")
+    walks = [survey_walk(site, read(path))[0] for path in files.survey]
+    survey = survey_from_walks([w for w in walks if w is not None], site.floor_names)
+    WalkRadioMap(survey, SurveyParameters(), site.name).save(folder / "map.npz")
+    return SmallWorld(folder, site, survey, tuple(read(path) for path in files.walks), files.truth)

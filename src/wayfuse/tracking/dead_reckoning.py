@@ -45,6 +45,7 @@ class DeadReckoning:
     rotation: float = 0.0
     heading_error: float = 0.2
     uses_steps: bool = True
+    uses_scans: bool = False
     supports_lag: bool = False
 
     def init(self, track: str, seed: int) -> DeadReckoningState:

@@ -24,13 +24,18 @@ class Why(NamedTuple):
 class Engine(Protocol[S]):
     """A positioning method as pure functions of its own state ``S``.
 
-    ``uses_steps`` tells whether it moves on steps (else it diffuses with time); ``supports_lag`` whether it can say
-    later where it was.
+    ``uses_steps`` tells whether it moves on steps (else it diffuses with time); ``uses_scans`` whether it looks at
+    scans; ``supports_lag`` whether it can say later where it was.
     """
 
     @property
     def uses_steps(self) -> bool:
         """Whether steps move it."""
+        ...
+
+    @property
+    def uses_scans(self) -> bool:
+        """Whether scans change it."""
         ...
 
     @property

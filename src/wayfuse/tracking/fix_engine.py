@@ -39,6 +39,7 @@ class FixEngine:
     radius_68: tuple[float, float] = (3.0, 15.0)
     radius_95: tuple[float, float] = (6.0, 45.0)
     uses_steps: bool = True  # steps are counted, nothing else
+    uses_scans: bool = True
     supports_lag: bool = False
 
     def init(self, track: str, seed: int) -> FixState:

@@ -90,6 +90,7 @@ class ParticleEngine:
     n_particles: int = 1000
     uses_steps: bool = True
     rotation: float = 0.0
+    uses_scans: bool = True
     supports_lag: bool = True
 
     def __post_init__(self) -> None:
@@ -166,9 +167,10 @@ class ParticleEngine:
 
     def recall(self, state: ParticleState) -> tuple[ParticleState, Estimate]:
         """Where the ancestors of today's particles were at the oldest mark, weighted by what is known today."""
-        t, marks = state.marks[0], state.marks[1:]
-        state = state._replace(marks=marks)
-        if state.filter is None or not state.filter.history or state.filter.history[0].t != t:
+        t, n_marks = state.marks[0], len(state.marks)
+        state = state._replace(marks=state.marks[1:])
+        # marks of the time before the first usable scan have no snapshot
+        if state.filter is None or len(state.filter.history) < n_marks:
             return self._explained(state, unknown(t, self.prior))
         past = state.filter.history[0]
         state = state._replace(filter=state.filter._replace(history=state.filter.history[1:]))

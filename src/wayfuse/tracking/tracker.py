@@ -2,7 +2,8 @@
 
 `Tracker.step` is the live form: state and record in, state and estimates out. `Tracker.run` replays a whole
 recording with the array path of the front end and gives the same bits. Estimates come at every delivered scan, at
-every step that moves the method, and at least once per `interval`; an estimate for time t uses records up to t (plus the lag, where one is asked).
+every step that moves the method, and at least once per `interval`; an estimate for time t uses records up to t (plus
+the lag, where one is asked).
 
 Bad records never stop a track: they get a `Verdict` and are counted.
 """
@@ -10,7 +11,7 @@ Bad records never stop a track: they get a `Verdict` and are counted.
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Generic, NamedTuple, TypeVar
 
 import numpy as np
@@ -27,6 +28,7 @@ from wayfuse.sensors.records import (
     Orientation,
     Record,
     RotationRate,
+    Waypoint,
     WifiScan,
 )
 from wayfuse.tracking.engine import Engine
@@ -39,6 +41,7 @@ S = TypeVar("S")
 _MOTION = (Acceleration, RotationRate, MagneticField, Orientation)
 _QUIET_AFTER = 2.0  # s without motion sensors until a method diffuses (a standing phone still reports)
 _LONGEST_GAP = 300.0  # s; after a longer silence the track starts anew: the person can be anywhere
+_FAR = 1e12  # s; times beyond are no times: float64 no longer tells milliseconds apart
 
 
 class TrackState(NamedTuple, Generic[S]):
@@ -58,19 +61,9 @@ class TrackState(NamedTuple, Generic[S]):
 
 
 class _Replay(NamedTuple):
-    """What `step` sees record by record, for a recording that is at hand whole.
-
-    motion : (n,) s, acceleration times. breaks : times at which motion sensors or scans end a long silence.
-    """
+    """What `step` sees record by record, for a recording that is at hand whole: (n,) s, acceleration times."""
 
     motion: Array
-    breaks: tuple[float, ...]
-
-    @classmethod
-    def of(cls, recording: Recording) -> _Replay:
-        motion = recording.acceleration.t
-        heard = np.sort(np.concatenate([motion, [scan.t for scan in recording.wifi]]))
-        return cls(motion, tuple(heard[1:][np.diff(heard) > _LONGEST_GAP].tolist()))
 
     def last_motion(self, t: float) -> float:
         i = int(np.searchsorted(self.motion, t, side="right"))
@@ -117,25 +110,27 @@ class Tracker(Generic[S]):
 
     def step(self, state: TrackState[S], record: Record) -> tuple[TrackState[S], list[Estimate], Verdict]:
         """Take one record: the state after it, the estimates that are due, and what became of the record."""
+        if isinstance(record, Waypoint):  # truth is no input, not even its time
+            return state, [], Verdict.IGNORED
         if not np.isfinite(record.t):
             return state, [], Verdict.NOT_FINITE
+        if abs(record.t) > _FAR:
+            return state, [], Verdict.OUT_OF_RANGE
         if record.t < state.now:
             return state, [], Verdict.LATE
         out: list[Estimate] = []
-        if isinstance(record, Acceleration | WifiScan):
-            if record.t - state.last_heard > _LONGEST_GAP:
-                state = self._restart(state, record.t, out, None)
+        is_heard = isinstance(record, Acceleration | WifiScan)
+        is_paused = state.now > -np.inf and record.t - state.now > _LONGEST_GAP
+        if is_paused or (is_heard and record.t - state.last_heard > _LONGEST_GAP):
+            state = self._restart(state, record.t, out)
+        if is_heard:
             state = state._replace(last_heard=record.t)
         state = self._advance(state, record.t, out, None)
         if isinstance(record, WifiScan):
             state, verdict = self._scan(state, record, out)
             return state, out, verdict
         if not isinstance(record, _MOTION):
-            return (
-                state,
-                out,
-                Verdict.IGNORED,
-            )  # waypoints are truth, not input; ranges and BLE have no model yet
+            return state, out, Verdict.IGNORED  # ranges, BLE, pressure: no model yet
         front_end, event = self.front_end.step(state.front_end, record)
         state = state._replace(front_end=front_end)
         if isinstance(record, Acceleration):
@@ -152,13 +147,16 @@ class Tracker(Generic[S]):
 
     def run(self, recording: Recording, seed: int = 0) -> Track:
         """Replay a recording: the same bits as `step` over its records and `flush` at its end."""
+        recording = replace(recording, waypoints=())
         state = self.init(recording.name, seed)
         out: list[Estimate] = []
         verdicts: Counter[Verdict] = Counter()
         if recording.is_empty:
             return Track(recording.name, out, verdicts)
+        if _has_breaks(recording):
+            return self._run_by_record(recording, state)
         start, end = recording.span
-        replay = _Replay.of(recording)
+        replay = _Replay(recording.acceleration.t)
         state = self._advance(state, start, out, replay)
         done = -np.inf
         for scan in recording.wifi:
@@ -171,6 +169,16 @@ class Tracker(Generic[S]):
         state = self._advance(state, end, out, replay)
         self._finish(state, end, out, replay)
         return Track(recording.name, out, verdicts)
+
+    def _run_by_record(self, recording: Recording, state: TrackState[S]) -> Track:
+        out: list[Estimate] = []
+        verdicts: Counter[Verdict] = Counter()
+        for record in recording.records():
+            state, said, verdict = self.step(state, record)
+            out += said
+            if isinstance(record, WifiScan):
+                verdicts[verdict] += 1
+        return Track(recording.name, out + self.flush(state, state.now)[1], verdicts)
 
     def _steps(
         self,
@@ -193,22 +201,28 @@ class Tracker(Generic[S]):
     def _advance(
         self, state: TrackState[S], t: float, out: list[Estimate], replay: _Replay | None
     ) -> TrackState[S]:
-        """Let time pass to t: the outputs due before t, then t itself."""
+        """Let time pass to t: what is due before t, then t itself."""
         if state.now == -np.inf:
             return self._heard(state._replace(now=t, next_output=t, diffused=t), t, replay)
-        if replay is not None:
-            for silence_ends in replay.breaks:
-                if state.now < silence_ends <= t:
-                    state = self._restart(state, silence_ends, out, replay)
-        while state.next_output < t:
-            state = self._output(self._heard(state, state.next_output, replay), state.next_output, out)
+        state = self._pass(state, t, out, replay)
         return self._heard(state._replace(now=t), t, replay)
 
-    def _restart(
+    def _pass(
         self, state: TrackState[S], t: float, out: list[Estimate], replay: _Replay | None
     ) -> TrackState[S]:
+        """The outputs due before t, and the estimates whose lag is over before t, in time order."""
+        while True:
+            ripe = state.pending[0] + self.lag if state.pending else np.inf
+            if min(state.next_output, ripe) >= t:
+                return state
+            if state.next_output <= ripe:
+                state = self._output(self._heard(state, state.next_output, replay), state.next_output, out)
+            else:
+                state = self._recall(state, out)
+
+    def _restart(self, state: TrackState[S], t: float, out: list[Estimate]) -> TrackState[S]:
         """After a long silence the person can be anywhere: finish what was, begin anew under a name of its own."""
-        state = self._finish(state, state.now, out, replay)
+        state = self._finish(state, state.now, out, None)
         fresh = self.init(f"{state.name}@{t:.3f}", state.seed)
         return fresh._replace(front_end=state.front_end, now=t, next_output=t, diffused=t, last_heard=t)
 
@@ -219,8 +233,7 @@ class Tracker(Generic[S]):
     def _finish(
         self, state: TrackState[S], until: float, out: list[Estimate], replay: _Replay | None
     ) -> TrackState[S]:
-        while state.next_output <= until:
-            state = self._output(self._heard(state, state.next_output, replay), state.next_output, out)
+        state = self._pass(state, np.nextafter(until, np.inf), out, replay)
         while state.pending:
             state = self._recall(state, out)
         return state
@@ -243,6 +256,8 @@ class Tracker(Generic[S]):
             engine = self.engine.on_fingerprint(before, scan.t, fingerprint, heading_known=known)
             state = state._replace(engine=engine)
             verdict = Verdict.USED if engine is not before else Verdict.UNKNOWN_ACCESS_POINTS
+            if not self.engine.uses_scans:
+                verdict = Verdict.IGNORED
         else:
             verdict = Verdict.DUPLICATE if repeated else Verdict.OUT_OF_RANGE
         return self._output(state, scan.t, out), verdict
@@ -260,12 +275,18 @@ class Tracker(Generic[S]):
             engine, estimate = self.engine.estimate(state.engine, t)
             out.append(estimate)
             return state._replace(engine=engine)
-        state = state._replace(engine=self.engine.mark(state.engine, t), pending=(*state.pending, t))
-        while state.pending and state.pending[0] + self.lag <= t:
-            state = self._recall(state, out)
-        return state
+        return state._replace(engine=self.engine.mark(state.engine, t), pending=(*state.pending, t))
 
     def _recall(self, state: TrackState[S], out: list[Estimate]) -> TrackState[S]:
         engine, estimate = self.engine.recall(state.engine)
         out.append(estimate)
         return state._replace(engine=engine, pending=state.pending[1:])
+
+
+def _has_breaks(recording: Recording) -> bool:
+    """Whether times are so far apart, or so odd, that a track of the recording is best fed record by record."""
+    heard = np.concatenate([recording.acceleration.t, [scan.t for scan in recording.wifi]])
+    start, end = recording.span
+    inside = np.concatenate([np.sort(heard), [end]])
+    gaps = np.diff(inside, prepend=start)
+    return not (start >= -_FAR and end <= _FAR and bool(np.all(gaps <= _LONGEST_GAP)))
