@@ -21,6 +21,11 @@ if TYPE_CHECKING:
 __all__ = ["METHODS", "demo", "run_demo"]
 
 METHODS = ("fused", "random-walk", "wknn", "nnss", "pdr")
+_ALONE = (
+    "--jobs",
+    "1",
+)  # so few walks: several processes would each compile the kernels, where they are not yet
+_WALK_PICTURES = 6
 _MARK = "wayfuse-demo.txt"  # tells a folder of the demo from one that is somebody's own
 _MARK_TEXT = "Written by `wayfuse demo`, which replaces the folder's content when it runs again.\n"
 _DATA, _SITE, _MAP, _ESTIMATES, _PICTURES = "data", "site", "radio-map.npz", "estimates.csv", "pictures"
@@ -65,7 +70,7 @@ def run_demo(
             _say("Draw the floors.")
             _run("site", "show", folder / _SITE, "--out", folder / _PICTURES / "site")
         _say("Build the radio map from the survey walks.")
-        _run("survey", "build", folder / _SITE, folder / _DATA / "survey", "--out", folder / _MAP)
+        _run("survey", "build", folder / _SITE, folder / _DATA / "survey", *_ALONE, "--out", folder / _MAP)
         _track(folder, seed)
         _evaluate(folder, pictures)
 
@@ -108,7 +113,7 @@ def _track(folder: Path, seed: int) -> None:
     _say("Track the other walks by each method (pdr is told where it starts).")
     methods = [word for name in METHODS for word in ("--method", name)]
     walks, made = folder / _DATA / "walks", folder / _MAP
-    options = ("--start", "waypoint", "--seed", seed, "--out", folder / _ESTIMATES)
+    options = ("--start", "waypoint", "--seed", seed, *_ALONE, "--out", folder / _ESTIMATES)
     _run("track", folder / _SITE, walks, "--radio-map", made, *methods, *options)
 
 
@@ -116,13 +121,13 @@ def _evaluate(folder: Path, pictures: bool) -> None:
     import json
 
     _say("Compare the estimates with the waypoints of the walks.")
-    drawn = ("--plots", folder / _PICTURES) if pictures else ()
+    drawn = ("--plots", folder / _PICTURES, "--max-pictures", _WALK_PICTURES) if pictures else ()
     report = folder / _REPORT
     _run("evaluate", folder / _ESTIMATES, folder / _DATA / "walks", *drawn, "--out", report)
     click.echo(_table(json.loads(report.read_text(encoding="utf-8"))))
     if pictures:
         click.echo(f"\nerrors of all methods     {folder / _PICTURES / 'cdf.png'}")
-        click.echo(f"a picture of each walk    {folder / _PICTURES / 'walks'}")
+        click.echo(f"paths of single walks     {folder / _PICTURES / 'walks'}")
         click.echo(f"floor plans               {folder / _PICTURES / 'site'}")
 
 
