@@ -25,7 +25,7 @@ from wayfuse.radio.sparse_knn import Neighbours, SparseKnn
 from wayfuse.radio.survey import Fingerprint
 from wayfuse.tracking.engine import Why, unknown
 from wayfuse.tracking.estimate import Estimate, State
-from wayfuse.tracking.summary import Summary, summarise
+from wayfuse.tracking.summary import Summary, on_walkable, summarise
 
 __all__ = ["ParticleEngine", "ParticleState", "Recovery"]
 
@@ -196,6 +196,7 @@ class ParticleEngine:
     def _say(self, state: ParticleState, t: float, where: Snapshot) -> tuple[ParticleState, Estimate]:
         assert state.filter is not None  # noqa: S101 (callers checked)
         e = summarise(where, state.filter.weights, len(self.radio_map.floors), t, self.summary)
+        e = on_walkable(e, where, self.first.walkable)
         is_settled = state.is_settled or e.r95 <= self.recovery.settled
         lost = state.contradictions >= self.recovery.patience or (is_settled and e.r95 > self.recovery.lost)
         label = State.LOST if lost else State.TRACKING if is_settled else State.INITIALISING

@@ -15,9 +15,10 @@ from wayfuse.core.errors import ConfigError
 from wayfuse.core.types import Array, Array32
 from wayfuse.filters._kernels import floor_masses, geometric_median, scatter
 from wayfuse.filters.particle_filter import Snapshot
+from wayfuse.maps.walkable import Walkable
 from wayfuse.tracking.estimate import Estimate, State
 
-__all__ = ["Summary", "summarise"]
+__all__ = ["Summary", "on_walkable", "summarise"]
 
 _SMOOTH = 0.5  # m; Weiszfeld's weights are 1 / max(distance, about this)
 
@@ -53,6 +54,19 @@ def summarise(cloud: Snapshot, weights: Array, n_floors: int, t: float, how: Sum
     r68 = how.offset_68 + how.scale_68 * r68
     r95 = max(how.offset_95 + how.scale_95 * r95, r68)
     return Estimate(t, x, y, floor, xx, xy, yy, r68, r95, State.TRACKING)
+
+
+def on_walkable(estimate: Estimate, cloud: Snapshot, walkable: tuple[Walkable, ...]) -> Estimate:
+    """The estimate, moved to the nearest particle of its floor where it lies in a wall, a shop or a void.
+
+    A median of particles on both sides of an atrium lies in the atrium. Empty ``walkable`` = no map, nothing moves.
+    """
+    if not walkable or bool(walkable[estimate.floor].contains(estimate.x, estimate.y)):
+        return estimate
+    dx, dy = cloud.x - np.float32(estimate.x), cloud.y - np.float32(estimate.y)
+    squared = np.where(cloud.floor == estimate.floor, dx * dx + dy * dy, np.inf)
+    nearest = int(np.argmin(squared))
+    return estimate._replace(x=float(cloud.x[nearest]), y=float(cloud.y[nearest]))
 
 
 def _weighted_quantiles(values: Array32, weights: Array, shares: tuple[float, float]) -> tuple[float, float]:
