@@ -73,7 +73,7 @@ def multinomial(noise: Noise, weights: Array, n: int) -> NDArray[np.int64]:
 def residual(noise: Noise, weights: Array, n: int) -> NDArray[np.int64]:
     """floor(n w_i) copies each, the rest multinomially from the remainders n w_i - floor(n w_i)."""
     w = weights / np.sum(weights)
-    copies = np.floor(n * w).astype(np.int64)
+    copies = np.floor(n * w + 1e-9).astype(np.int64)  # n * (1 / n) may fall short of 1
     kept = np.repeat(np.arange(len(w)), copies)
     rest = n - len(kept)
     if rest > 0:
