@@ -7,11 +7,15 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
+from hypothesis import settings
 
 from wayfuse.maps.site import Site
 from wayfuse.radio.survey import Survey
 from wayfuse.sensors.recording import Recording
 from wayfuse.simulator.simulate import Truth
+
+settings.register_profile("wayfuse", deadline=None)  # the first example may have to wait for the compiler
+settings.load_profile("wayfuse")
 
 
 @pytest.fixture(scope="session")

@@ -150,7 +150,7 @@ def _until(recording: Recording, t: float) -> Recording:
     )
 
 
-@settings(max_examples=15, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=15, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(
     variant=st.sampled_from(["as it is", "IMU stops", "pause of an hour", "no IMU", "Wi-Fi stops"]),
     lag=st.sampled_from([0.0, 0.0, 2.0, 5.0]),
