@@ -122,9 +122,8 @@ def _fingerprint(
 
 
 def _count_channels(heard: Readings, channel: dict[int, dict[int, int]]) -> None:
-    pairs, counts = np.unique(
-        np.stack([heard.bssid, heard.frequency.astype(np.uint64)]), axis=1, return_counts=True
-    )
+    frequency = np.maximum(heard.frequency, 0).astype(np.uint64)  # a negative channel is an unknown one
+    pairs, counts = np.unique(np.stack([heard.bssid, frequency]), axis=1, return_counts=True)
     for (b, f), n in zip(pairs.T.tolist(), counts.tolist(), strict=True):
         of = channel.setdefault(b, {})
         of[f] = of.get(f, 0) + n
