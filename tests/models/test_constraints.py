@@ -119,7 +119,7 @@ def test_one_floor_alone_and_no_blocked_move(floors: tuple[Floor, ...]) -> None:
 
 def test_a_particle_in_a_shop_can_leave_it(floors: tuple[Floor, ...]) -> None:
     before, after = clouds(
-        np.array([0, 0]), np.array([(10.0, 5.0)] * 2), np.array([(11.0, 5.0), (10.0, 8.0)])
+        np.array([0, 0]), np.array([(10.0, 5.0)] * 2), np.array([(11.0, 5.0), (10.0, 7.6)])
     )
     kept, n = WalkableMask(tuple(f.walkable for f in floors)).restrict(before, after, np.zeros(2))
     assert n == 2  # both pay: one stays inside, the other's middle does
