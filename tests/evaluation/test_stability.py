@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from made_up_walks import House, track
 
+from wayfuse.evaluation.estimates_file import WalkEstimates
 from wayfuse.evaluation.stability import count_flaps, jump_lengths, stability
 from wayfuse.evaluation.truth import CommonFrame
 
@@ -61,3 +62,22 @@ def test_a_change_of_floor_between_frames_is_no_jump() -> None:
     climbs = track([0.0, 1.0], [(50.0, 0.0), (-50.0, 0.0)], ["F1", "F2"])
     assert stability([climbs]).n_jumps == 1
     assert stability([climbs], CommonFrame(house)).n_jumps == 0
+
+
+def test_the_leap_from_the_prior_to_the_first_fix_is_no_jump() -> None:
+    t = np.arange(4.0)
+    xy = np.array([[50.0, 50.0], [5.0, 5.0], [6.0, 5.0], [30.0, 5.0]])
+    state = np.array(["initialising", "initialising", "tracking", "tracking"])
+    leaping = WalkEstimates(
+        walk="w",
+        method="m",
+        t=t,
+        xy=xy,
+        floor=np.array(["B1", "F1", "F1", "F1"]),
+        lonlat=np.full((4, 2), np.nan),
+        numbers={},
+        state=state,
+    )
+    counted = stability([leaping])
+    assert (counted.n_jumps, counted.n_floor_changes) == (1, 0)
+    assert counted.longest_jump == 24.0

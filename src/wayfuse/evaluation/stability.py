@@ -64,13 +64,19 @@ def count_flaps(t: Array, floor: NDArray[np.str_]) -> tuple[int, int]:
 
 
 def stability(tracks: Iterable[WalkEstimates], frame: CommonFrame | None = None) -> Stability:
-    """Counts over tracks; ``frame`` takes the floors of a site, which have frames of their own, into one."""
+    """Counts over tracks, from the end of their initialising state on.
+
+    ``frame`` takes the floors of a site, which have frames of their own, into one.
+    """
     frame = CommonFrame() if frame is None else frame
     seconds, jumps, changes, flaps, longest = 0.0, 0, 0, 0, 0.0
     for track in tracks:
-        seconds += float(track.t[-1] - track.t[0]) if len(track) else 0.0
-        lengths = jump_lengths(track.t, track.xy + frame.shift(track.floor))
-        n_changes, n_flaps = count_flaps(track.t, track.floor)
+        known = np.flatnonzero(track.states() != "initialising")
+        settled = slice(int(known[0]) if len(known) else len(track), None)
+        t, floor = track.t[settled], track.floor[settled]
+        seconds += float(t[-1] - t[0]) if len(t) else 0.0
+        lengths = jump_lengths(t, (track.xy + frame.shift(track.floor))[settled])
+        n_changes, n_flaps = count_flaps(t, floor)
         jumps, changes, flaps = jumps + len(lengths), changes + n_changes, flaps + n_flaps
         longest = max(longest, float(lengths.max(initial=0.0)))
     return Stability(seconds / 60.0, jumps, longest, changes, flaps)
