@@ -28,8 +28,8 @@ test-fast: setup
 check: test
 
 lint: setup
-	$(VENV)/bin/ruff check src tests benchmarks
-	$(VENV)/bin/ruff format --check src tests benchmarks
+	$(VENV)/bin/ruff check src tests benchmarks scripts docs/skeletons
+	$(VENV)/bin/ruff format --check src tests benchmarks scripts docs/skeletons
 
 types: setup
 	$(VENV)/bin/mypy

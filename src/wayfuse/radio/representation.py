@@ -5,7 +5,7 @@ Each representation maps dBm, NaN where unheard, to numbers >= 0 in which unhear
 puts the missing value in). Readings at or below the missing value count as unheard.
 
 >>> powed = Representation("powed", missing=-100.0, parameter=2.0)
->>> powed(np.array([-50.0, -90.0, np.nan])).tolist()
+>>> powed(np.array([-50.0, -90.0, np.nan])).round(4).tolist()
 [0.25, 0.01, 0.0]
 
 References

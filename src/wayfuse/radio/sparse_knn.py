@@ -104,7 +104,8 @@ class SparseKnn:
         overlap = np.zeros(len(self.survey), np.float32)
         accumulate_overlap(column, value, weight, self._start, self._rows, self._values, overlap)
         total = self._row_sum + np.float32(np.sum(weight * value)) + np.float32(1e-6)
-        return 1.0 - 2.0 * overlap / total, int(np.count_nonzero(weight * value > 0.0))
+        distance: Array32 = np.float32(1.0) - np.float32(2.0) * overlap / total
+        return distance, int(np.count_nonzero(weight * value > 0.0))
 
     def neighbours(self, fingerprint: Fingerprint) -> Neighbours | None:
         """The k nearest; None where the survey knows no access point of the query."""

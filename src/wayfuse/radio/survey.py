@@ -57,8 +57,15 @@ class Survey:
 
     def __post_init__(self) -> None:
         n, m = len(self.xy), len(self.bssid)
-        if len(self.indptr) != n + 1 or len(self.floor) != n or len(self.walk) != n or len(self.frequency) != m:
-            raise RadioMapError(f"survey arrays disagree: {n} places, {len(self.indptr) - 1} rows, {m} access points")
+        if (
+            len(self.indptr) != n + 1
+            or len(self.floor) != n
+            or len(self.walk) != n
+            or len(self.frequency) != m
+        ):
+            raise RadioMapError(
+                f"survey arrays disagree: {n} places, {len(self.indptr) - 1} rows, {m} access points"
+            )
         if m and np.any(np.diff(self.bssid.astype(np.uint64)) == 0):
             raise RadioMapError("survey: access points must be unique and ascending")
 
