@@ -177,6 +177,8 @@ class ParticleEngine:
         return self._say(state, t, past)
 
     def _moved(self, state: ParticleState, after: FilterState, n_blocked: int, why: Why) -> ParticleState:
+        if n_blocked:  # penalties add up: without a scan for long all weight would end on a few particles
+            after, _ = self.filter.update(state.key, after, np.zeros(self.n_particles))
         blocked = why._replace(share_blocked=why.share_blocked + n_blocked / self.n_particles)
         return state._replace(filter=after, draw=after.draw, why=blocked, n_moves=state.n_moves + 1)
 

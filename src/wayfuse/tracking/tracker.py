@@ -10,6 +10,7 @@ Bad records never stop a track: they get a `Verdict` and are counted.
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from dataclasses import dataclass, field, replace
 from typing import Generic, NamedTuple, TypeVar
@@ -239,6 +240,8 @@ class Tracker(Generic[S]):
         return state
 
     def _step_event(self, state: TrackState[S], event: StepEvent, out: list[Estimate]) -> TrackState[S]:
+        if not (math.isfinite(event.length) and math.isfinite(event.heading)):  # sensors gone mad
+            return state
         engine = self.engine.on_step(state.engine, event, heading_known=state.front_end.is_heading_absolute)
         if engine is state.engine:
             return state
