@@ -1,7 +1,7 @@
 """exp, log and sincos in float32, as short polynomials that kernels can inline and vectorise.
 
 The numba of the package index has no vector mathematics library: `math.exp` in a loop is a scalar call. These are
-accurate to a few units in 1e-6, ample for weights and noise, and give the same bits on every machine (no libm).
+accurate to a few units in 1e-6, ample for weights and noise, and do not depend on the libm of a machine.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ import numpy as np
 
 from wayfuse.core.jit import inline_kernel
 
-__all__ = ["exp32", "log32", "sincos_turn32"]
+__all__ = ["exp32", "log32", "sincos32", "sincos_turn32"]
 
 
 @inline_kernel
@@ -48,6 +48,26 @@ def log32(x: np.float32) -> np.float32:
     p = p * z + np.float32(2.0 / 3.0)
     p = p * z + np.float32(2.0)
     return s * p + k * np.float32(0.69314718)
+
+
+@inline_kernel
+def sincos32(x: np.float32) -> tuple[np.float32, np.float32]:
+    """Sine and cosine of x (rad), |x| < 1e4, absolute error below 4e-6 for |x| < 10; without a branch."""
+    k = np.floor(x * np.float32(0.15915494) + np.float32(0.5))
+    t = (x - k * np.float32(6.28125)) - k * np.float32(1.9353072e-3)  # 2 pi in two parts
+    t *= np.float32(0.25)
+    z = t * t
+    s = t * (
+        np.float32(1.0)
+        + z * (np.float32(-1.0 / 6.0) + z * (np.float32(1.0 / 120.0) - z * np.float32(1.0 / 5040.0)))
+    )
+    c = z * (
+        np.float32(0.5)
+        + z * (np.float32(-1.0 / 24.0) + z * (np.float32(1.0 / 720.0) - z * np.float32(1.0 / 40320.0)))
+    )  # 1 - cos
+    s2 = np.float32(2.0) * s * (np.float32(1.0) - c)
+    c2 = np.float32(1.0) - np.float32(2.0) * s * s
+    return np.float32(2.0) * s2 * c2, np.float32(1.0) - np.float32(2.0) * s2 * s2
 
 
 @inline_kernel

@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from wayfuse.core.jit import kernel
+from wayfuse.core.jit import fast_kernel, kernel
 from wayfuse.core.types import Array, Array32
 
 __all__ = ["floor_masses", "geometric_median", "normalise", "scatter"]
@@ -45,7 +45,7 @@ def floor_masses(floor: NDArray[np.int32], weights: Array, out: Array) -> None:
         out[floor[i]] += weights[i]
 
 
-@kernel
+@fast_kernel
 def geometric_median(
     x: Array32,
     y: Array32,
@@ -63,11 +63,10 @@ def geometric_median(
     mx = 0.0
     my = 0.0
     for i in range(x.shape[0]):
-        if floor[i] == on:
-            w = weights[i]
-            total += w
-            mx += w * x[i]
-            my += w * y[i]
+        w = weights[i] * np.float64(floor[i] == on)
+        total += w
+        mx += w * x[i]
+        my += w * y[i]
     mx /= total
     my /= total
     for _ in range(n_iterations):
@@ -75,19 +74,18 @@ def geometric_median(
         sx = 0.0
         sy = 0.0
         for i in range(x.shape[0]):
-            if floor[i] == on:
-                dx = x[i] - mx
-                dy = y[i] - my
-                w = weights[i] / math.sqrt(dx * dx + dy * dy + smooth * smooth)
-                total += w
-                sx += w * x[i]
-                sy += w * y[i]
+            dx = x[i] - mx
+            dy = y[i] - my
+            w = weights[i] * np.float64(floor[i] == on) / math.sqrt(dx * dx + dy * dy + smooth * smooth)
+            total += w
+            sx += w * x[i]
+            sy += w * y[i]
         mx = sx / total
         my = sy / total
     return mx, my
 
 
-@kernel
+@fast_kernel
 def scatter(
     x: Array32,
     y: Array32,
@@ -110,10 +108,9 @@ def scatter(
         dx = x[i] - mx
         dy = y[i] - my
         radius[i] = math.sqrt(dx * dx + dy * dy)
-        if floor[i] == on:
-            w = weights[i]
-            total += w
-            xx += w * dx * dx
-            xy += w * dx * dy
-            yy += w * dy * dy
+        w = weights[i] * np.float64(floor[i] == on)
+        total += w
+        xx += w * dx * dx
+        xy += w * dx * dy
+        yy += w * dy * dy
     return xx / total, xy / total, yy / total

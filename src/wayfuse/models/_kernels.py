@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from wayfuse.core.elementary import exp32, log32
+from wayfuse.core.elementary import exp32, log32, sincos32
 from wayfuse.core.jit import fast_kernel, kernel
 from wayfuse.core.types import Array, Array32
 
@@ -33,14 +33,19 @@ def pdr_move(
     new_scale: Array32,
 ) -> None:
     """Move every particle by one step; ``z`` (4, N) standard normals: length, heading, bias, scale."""
+    step = np.float32(length)
+    toward = np.float32(heading)
+    sd_length = np.float32(length_sigma)
+    sd_heading = np.float32(heading_sigma)
+    sd_bias = np.float32(bias_sigma)
+    sd_scale = np.float32(scale_sigma)
     for i in range(x.shape[0]):
-        b = bias[i] + bias_sigma * z[2, i]
-        s = scale[i] + scale_sigma * z[3, i]
-        s = max(s, 0.4)
-        d = length * s * (1.0 + length_sigma * z[0, i])
-        h = heading + b + heading_sigma * z[1, i]
-        new_x[i] = x[i] + d * math.cos(h)
-        new_y[i] = y[i] + d * math.sin(h)
+        b = bias[i] + sd_bias * z[2, i]
+        s = max(scale[i] + sd_scale * z[3, i], np.float32(0.4))
+        d = step * s * (np.float32(1.0) + sd_length * z[0, i])
+        sine, cosine = sincos32(toward + b + sd_heading * z[1, i])
+        new_x[i] = x[i] + d * cosine
+        new_y[i] = y[i] + d * sine
         new_bias[i] = b
         new_scale[i] = s
 
@@ -121,6 +126,7 @@ def mixture_log_likelihood(
         for i in range(x.shape[0]):
             dx = x[i] - px
             dy = y[i] - py
-            total[i] += (w if floor[i] == f else np.float32(0.0)) * exp32(half * (dx * dx + dy * dy))
+            # times 0 or 1 rather than a choice: a branch here costs a factor of twelve
+            total[i] += w * exp32(half * (dx * dx + dy * dy)) * np.float32(floor[i] == f)
     for i in range(x.shape[0]):
         out[i] += exponent * log32(total[i])

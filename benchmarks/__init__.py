@@ -1,0 +1,1 @@
+"""Benchmarks: ratios of variants that take turns in one run, minima and medians; never asserted in tests."""
