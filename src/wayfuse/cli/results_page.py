@@ -28,7 +28,7 @@ def page(sections: Mapping[str, Section], version: str, date: str = "") -> str:
             f"Written by `wayfuse results --out docs/results.md{only}`, wayfuse {version}{dated}; not edited by "
             "hand. Every figure is measured afresh on public recordings (`wayfuse datasets fetch`); a set that is"
             " missing is not measured, and said so. Facts about step length and heading: "
-            "`benchmarks/inertial.py`."
+            "[benchmarks/inertial.py](../benchmarks/inertial.py)."
         ),
         (
             "Errors are horizontal, in metres. Brackets are 90 % intervals: bootstrap over whole walks (test "
