@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from wayfuse.core.elementary import exp32, log32, sincos_turn32
+from wayfuse.core.elementary import exp32, log32, sincos32, sincos_turn32
 from wayfuse.core.jit import kernel
 from wayfuse.core.types import Array32
 
@@ -61,3 +61,17 @@ def test_sincos() -> None:
     angle = 2.0 * np.pi * (word.astype(np.float64) + 0.5) / 2.0**32
     assert np.max(np.abs(sine - np.sin(angle))) < 3e-6
     assert np.max(np.abs(cosine - np.cos(angle))) < 3e-6
+
+
+@kernel
+def _sincos_of_angles(x: Array32, sine: Array32, cosine: Array32) -> None:
+    for i in range(x.shape[0]):
+        sine[i], cosine[i] = sincos32(x[i])
+
+
+def test_sincos_of_angles() -> None:
+    x = np.concatenate([np.linspace(-100, 100, 200_001), np.pi * np.arange(-8, 9) / 4]).astype(np.float32)
+    sine, cosine = np.empty_like(x), np.empty_like(x)
+    _sincos_of_angles(x, sine, cosine)
+    np.testing.assert_allclose(sine, np.sin(x.astype(np.float64)), atol=4e-6, rtol=0)
+    np.testing.assert_allclose(cosine, np.cos(x.astype(np.float64)), atol=4e-6, rtol=0)
