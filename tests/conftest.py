@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import os
+import sys
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 import pytest
 from hypothesis import settings
@@ -68,3 +71,29 @@ def world(tmp_path_factory: pytest.TempPathFactory) -> SmallWorld:
     survey = survey_from_walks([w for w in walks if w is not None], site.floor_names)
     WalkRadioMap(survey, SurveyParameters(), site.name).save(folder / "map.npz")
     return SmallWorld(folder, site, survey, tuple(read(path) for path in files.walks), files.truth)
+
+
+class Said(NamedTuple):
+    """What a run of the command line gave."""
+
+    code: int
+    out: str
+    err: str
+
+
+@pytest.fixture
+def run_cli(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> Callable[..., Said]:
+    """Run ``wayfuse ARGUMENTS`` as its entry point does, in this process."""
+    from wayfuse.cli.main import main
+
+    def run(*arguments: object) -> Said:
+        monkeypatch.setattr(sys, "argv", ["wayfuse", *map(str, arguments)])
+        capsys.readouterr()
+        code = 0
+        try:
+            main()
+        except SystemExit as stop:
+            code = int(stop.code or 0)
+        return Said(code, *capsys.readouterr())
+
+    return run

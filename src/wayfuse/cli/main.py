@@ -55,7 +55,9 @@ class LazyGroup(click.Group):
             formatter.write_dl([(name, line) for name, (_, line) in self._lazy.items()])
 
 
-@click.group(cls=LazyGroup, commands_by_name=COMMANDS, context_settings={"help_option_names": ["-h", "--help"]})
+@click.group(
+    cls=LazyGroup, commands_by_name=COMMANDS, context_settings={"help_option_names": ["-h", "--help"]}
+)
 @click.version_option(__version__, prog_name="wayfuse")
 def cli() -> None:
     """Indoor tracking: Wi-Fi and phone motion sensors fused on floor plans."""
@@ -64,7 +66,9 @@ def cli() -> None:
 def main() -> None:
     """Run the command line; errors a user can mend are one line and exit status 2."""
     try:
-        cli.main(prog_name="wayfuse", standalone_mode=False)
+        status = cli.main(prog_name="wayfuse", standalone_mode=False)
+        if isinstance(status, int) and status:  # what a command gave to `Exit` comes back as a value
+            sys.exit(status)
     except WayfuseError as error:
         click.echo(f"wayfuse: {error}", err=True)
         sys.exit(2)

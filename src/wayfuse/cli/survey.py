@@ -39,7 +39,7 @@ def build_command(
 
     check_target(out)
     site = Site.load(site_folder)
-    paths = expand(recordings)
+    paths = list({path.resolve(): path for path in expand(recordings)}.values())
     walks: list[SurveyWalk] = []
     notes: list[str] = []
     failed = 0
@@ -48,10 +48,10 @@ def build_command(
         failed += not ok
         if walk is not None:
             walks.append(walk)
+    report_faults(notes)  # before building: they say why nothing could be built
     parameters = SurveyParameters()
     built = survey_from_walks(walks, site.floor_names, parameters)
     WalkRadioMap(built, parameters, site.name).save(out)
-    report_faults(notes)
     _render(built, len(walks), len(paths), out, as_json)
     if failed:
         raise click.exceptions.Exit(1)

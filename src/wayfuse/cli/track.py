@@ -9,11 +9,13 @@ import click
 
 if TYPE_CHECKING:
     from collections import Counter
+    from collections.abc import Sequence
 
     from wayfuse.evaluation.estimates_file import WalkEstimates
     from wayfuse.maps.site import Site
     from wayfuse.models.observation.coverage import SurveyDistance
     from wayfuse.radio.survey import Survey
+    from wayfuse.radio.walk_survey import WalkRadioMap
     from wayfuse.sensors.quality import Verdict
     from wayfuse.sensors.recording import Recording
 
@@ -83,7 +85,8 @@ def track(
 
     check_target(out)
     methods = tuple(dict.fromkeys(methods))
-    paths = expand(recordings)
+    paths = list({path.resolve(): path for path in expand(recordings)}.values())
+    _check_names(paths)
     worker = _Worker(site_folder, radio_map, methods, seed, lag, particles, start)
     worker.prepare()  # errors of use appear here, once, before any process starts
     parameters: dict[str, Any] = {"methods": list(methods), "particles": particles, "start": start or ""}
@@ -116,6 +119,33 @@ def track(
         click.echo(f"scans: {said}")
     if failed:
         raise click.exceptions.Exit(1)
+
+
+def _check_names(paths: Sequence[Path]) -> None:
+    """Refuse recordings that the rows of EST.csv could not tell apart."""
+    from wayfuse.core.errors import UsageError
+
+    first: dict[str, Path] = {}
+    for path in paths:
+        other = first.setdefault(path.stem if path.is_file() else path.name, path)
+        if other != path:
+            raise UsageError(
+                f"has the name of {other}", where=path, remedy="track them apart: walks are told by name"
+            )
+
+
+def _check_made_for(made: WalkRadioMap, site: Site, path: Path) -> None:
+    """Refuse the radio map of another site."""
+    from wayfuse.core.errors import RadioMapError
+    from wayfuse.presets.fused import check_floors
+
+    check_floors(site, made.survey)
+    if made.site != site.name:
+        raise RadioMapError(
+            f"radio map of site {made.site}, not of {site.name}",
+            where=path,
+            remedy="build the radio map with this site",
+        )
 
 
 class _Result:
@@ -159,7 +189,9 @@ class _Worker:
             from wayfuse.radio.walk_survey import load
 
             site = Site.load(self.paths[0])
-            survey = load(self.paths[1]).survey
+            made = load(self.paths[1])
+            _check_made_for(made, site, self.paths[1])
+            survey = made.survey
             if "pdr" in self.methods:
                 _check_start(self.start, site)
             trackers = {name: self._tracker(name, site, survey) for name in self.methods if name != "pdr"}
@@ -241,6 +273,8 @@ class _Worker:
 
 def _check_start(start: str | None, site: Site) -> Any:
     """A start of the command line: ``waypoint`` gives None."""
+    from math import isfinite
+
     from wayfuse.core.errors import UsageError
     from wayfuse.tracking.dead_reckoning import Start
 
@@ -250,6 +284,8 @@ def _check_start(start: str | None, site: Site) -> Any:
     try:
         x, y = float(parts[0]), float(parts[1])
         name = parts[2].strip()
+        if not (isfinite(x) and isfinite(y)):
+            raise ValueError
     except (IndexError, ValueError):
         raise UsageError(
             "method pdr needs a start" if not start else f"'{start}' is not a start",
@@ -261,8 +297,10 @@ def _check_start(start: str | None, site: Site) -> Any:
 
 def _lacks(recording: Recording) -> list[str]:
     """What a recording lacks for tracking, a line each."""
+    from dataclasses import replace
+
     where = recording.path or recording.name
-    if recording.is_empty:
+    if replace(recording, waypoints=()).is_empty:
         return [f"{where}: empty: no estimate"]
     out = []
     if not recording.wifi:

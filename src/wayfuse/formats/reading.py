@@ -108,7 +108,13 @@ def _listed(path: Path) -> list[str]:
         raise DataMissingError(
             "no such list of recordings", where=path, remedy="give @FILE with a path per line"
         )
-    lines = (line.strip() for line in path.read_text(encoding="utf-8").splitlines())
+    try:
+        text = path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise FormatError(
+            f"not a list of recordings: {error}", where=path, remedy="give a path per line"
+        ) from error
+    lines = (line.strip() for line in text.splitlines())
     return [line for line in lines if line and not line.startswith("#")]
 
 
