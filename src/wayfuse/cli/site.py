@@ -8,13 +8,16 @@ from typing import TYPE_CHECKING, Any
 import click
 
 if TYPE_CHECKING:
-    from wayfuse.maps.importers.ms_indoor import ImportReport
+    from wayfuse.maps.importers.report import ImportReport
     from wayfuse.maps.site import Site
 
 __all__ = ["site"]
 
-# name of a building format -> module of its importer: import_site(folder) -> (site, report)
-IMPORTERS = {"ms-indoor": "wayfuse.maps.importers.ms_indoor"}
+# name of a building format -> module of its importer: import_site(path) -> (site, report)
+IMPORTERS = {
+    "ms-indoor": "wayfuse.maps.importers.ms_indoor",
+    "osm": "wayfuse.maps.importers.osm",
+}
 
 
 @click.group(context_settings={"help_option_names": ["-h", "--help"]})
@@ -24,22 +27,24 @@ def site() -> None:
 
 @site.command("import")
 @click.argument("plan_format", metavar="FORMAT", type=click.Choice(sorted(IMPORTERS)))
-@click.argument("folder", metavar="DIR", type=click.Path(path_type=Path))
+@click.argument("path", metavar="PATH", type=click.Path(path_type=Path))
 @click.option("--out", required=True, type=click.Path(path_type=Path), help="Folder to write the site into.")
 @click.option("--overwrite", is_flag=True, help="Replace a site that is there already.")
 @click.option("--json", "as_json", is_flag=True, help="Print the floors as JSON.")
-def import_command(plan_format: str, folder: Path, out: Path, overwrite: bool, as_json: bool) -> None:
-    """Build a site from the floor plans in DIR.
+def import_command(plan_format: str, path: Path, out: Path, overwrite: bool, as_json: bool) -> None:
+    """Build a site from the floor plans in PATH.
 
-    FORMAT is ms-indoor: DIR holds one folder per floor (B1, F1, ...) with floor_info.json and
-    geojson_map.json.
+    FORMAT ms-indoor: PATH is a folder that holds one folder per floor (B1, F1, ...) with floor_info.json
+    and geojson_map.json.
+
+    FORMAT osm: PATH is a building of OpenStreetMap with Simple Indoor Tagging, .osm or .geojson.
     """
     import importlib
 
     from wayfuse.maps.store import check_target
 
     check_target(out, overwrite)
-    built, report = importlib.import_module(IMPORTERS[plan_format]).import_site(folder)
+    built, report = importlib.import_module(IMPORTERS[plan_format]).import_site(path)
     built.save(out, overwrite=overwrite)
     _render(built, report, out, as_json)
 

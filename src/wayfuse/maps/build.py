@@ -28,6 +28,7 @@ def build_floor(
     units: Sequence[Unit] = (),
     *,
     walls: Array | None = None,
+    closed: Sequence[Polygon] | None = None,
     width: float | None = None,
     height: float | None = None,
     elevation: float | None = None,
@@ -39,6 +40,9 @@ def build_floor(
     ----------
     outline, units : valid polygons (see `wayfuse.maps.geometry.clean_polygons`).
     walls : (w, 4) m; without them every edge of the outline and of a unit is a wall.
+    closed : areas nobody walks in; without them every unit is one, drawn so inexactly that walkable space is
+        widened into it. With them the plan is one of thin walls: people walk in all other units, nothing is
+        widened, and each wall is a barrier too.
     width, height : extent of the frame; without them the far corner of the outline.
     elevation : m; without it nominal by level.
 
@@ -51,8 +55,12 @@ def build_floor(
     corner = np.max([p.exterior.max(axis=0) for p in outline], axis=0)
     shapes = [unit.polygon for unit in units]
     segments = ring_walls([*outline, *shapes]) if walls is None else normalise_walls(walls)
-    free = free_space(outline, shapes)
-    barriers = edges(free)
+    if closed is None:
+        free = free_space(outline, shapes)
+        barriers = edges(free)
+    else:
+        free = free_space(outline, closed, widening=0.0)
+        barriers = normalise_walls(np.concatenate([segments, edges(free)]))
     return Floor(
         name=name,
         level=level,

@@ -76,11 +76,11 @@ def _union(polygons: Iterable[Polygon]) -> Any:
     return shapely.union_all([shapely.Polygon(p.exterior, [*p.holes]) for p in polygons])
 
 
-def free_space(outline: Iterable[Polygon], units: Iterable[Polygon]) -> Any:
-    """Outline minus units, without slits, widened by `WIDENING` inside the outline: shapely geometry (m)."""
+def free_space(outline: Iterable[Polygon], units: Iterable[Polygon], *, widening: float = WIDENING) -> Any:
+    """Outline minus units, without slits, widened (m) inside the outline: shapely geometry (m)."""
     whole: Any = _union(outline)
     free = whole.difference(_union(units))
-    opened = free.buffer(-0.5 * NARROWEST, join_style="mitre").buffer(0.5 * NARROWEST + WIDENING)
+    opened = free.buffer(-0.5 * NARROWEST, join_style="mitre").buffer(0.5 * NARROWEST + widening)
     return opened.intersection(whole)
 
 

@@ -45,7 +45,11 @@ class Polygon(NamedTuple):
 
 
 class Unit(NamedTuple):
-    """A closed area of a floor that people do not walk through: a shop, a room, a void."""
+    """An area of a floor: a shop, a room, a void, a corridor, stairs.
+
+    Whether people walk in it is the plan's to say (`Floor.walkable`): in the shops of ms-indoor they do not,
+    in the rooms of OpenStreetMap they do.
+    """
 
     id: str
     name: str
@@ -59,10 +63,10 @@ class Floor:
 
     name : as the plan has it. level : as people count, F1 = 1, B1 = -1; floors are sorted by it.
     width, height : m, extent of the frame. elevation : m above ground, nominal where the plan does not say.
-    outline : outer polygons with their holes. units : closed areas. walls : (w, 4) m: x0, y0, x1, y1.
+    outline : outer polygons with their holes. units : areas with a name or category. walls : (w, 4) m: x0, y0, x1, y1.
     barriers : (b, 4) m, edges of the walkable space: walls set back by its widening, for neither plans nor
     people are exact (of 3064 straight legs between surveyed waypoints in a mall, 5.3 % cross a wall and 1.9 %
-    a barrier).
+    a barrier). On a plan of thin walls and doors the walls themselves, which leave the doors open.
     walkable, wall_index, barrier_index : derived tables. anchor : to WGS84, None where the plan has none.
     """
 

@@ -26,6 +26,7 @@ from wayfuse.core.frames import GeoAnchor
 from wayfuse.core.types import Array
 from wayfuse.maps.build import build_floor, nominal_elevation
 from wayfuse.maps.geometry import clean_polygons
+from wayfuse.maps.importers.report import FloorReport, ImportReport
 from wayfuse.maps.levels import parse_level, sort_key
 from wayfuse.maps.site import Floor, Polygon, Site, Unit
 from wayfuse.maps.walls import LARGEST
@@ -51,23 +52,6 @@ CATEGORIES = {
     "5d357342db07255e49559a41": "service",
     "5d35734bdb07255e49559b0b": "education",
 }
-
-
-@dataclass(frozen=True, slots=True)
-class FloorReport:
-    """What the import of a floor met: residual of its frame (m, None without a plan) and warnings."""
-
-    name: str
-    residual: float | None
-    warnings: tuple[str, ...]
-
-
-@dataclass(frozen=True, slots=True)
-class ImportReport:
-    """Floor reports, bottom up, and warnings that concern the site."""
-
-    floors: tuple[FloorReport, ...]
-    warnings: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
