@@ -28,9 +28,7 @@ def map_recordings(
 
     ``work`` must be picklable: it is sent once to each process.
     """
-    n = min(
-        jobs or len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else jobs or 1, len(paths)
-    )
+    n = min(jobs or _cores(), len(paths))
     with click.progressbar(length=len(paths), label=label, file=sys.stderr) as bar:
         if n <= 1 or len(paths) <= _SERIAL:
             for path in paths:
@@ -39,8 +37,11 @@ def map_recordings(
             return
         from concurrent.futures import ProcessPoolExecutor
 
+        # the first one here: kernels that are not in the cache yet are then compiled once, not in every process
+        yield work(paths[0])
+        bar.update(1)
         with ProcessPoolExecutor(n, initializer=_start, initargs=(work,)) as pool:
-            for result in pool.map(_run, paths, chunksize=1):
+            for result in pool.map(_run, paths[1:], chunksize=1):
                 yield result  # type: ignore[misc]  # what ``work`` returned
                 bar.update(1)
 
@@ -61,6 +62,10 @@ def check_target(out: Path) -> None:
         raise UsageError("is a folder", where=out, remedy="name a file")
     if not out.parent.is_dir():
         raise UsageError(f"there is no folder {out.parent}", where=out, remedy="create it first")
+
+
+def _cores() -> int:
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def _start(work: Callable[[Path], object]) -> None:
