@@ -77,7 +77,9 @@ def test_a_track_of_the_tracker_is_written_whole(tmp_path: Path) -> None:
     ]
     anchor = GeoAnchor.from_origin(11.11, 49.46)
     path = tmp_path / "est.csv"
-    write_estimates(path, [from_track("w", "fused", rows, ("B1", "F1"), [anchor, anchor], np.array([0.5, 1.0, 1.5]))])
+    write_estimates(
+        path, [from_track("w", "fused", rows, ("B1", "F1"), [anchor, anchor], np.array([0.5, 1.0, 1.5]))]
+    )
     (again,) = read_estimates(path).tracks
     assert again.t.tolist() == [1.0, 2.0]  # of two at one time the later one
     assert again.xy.tolist() == [[0.0, 2.0], [9.0, 2.0]]

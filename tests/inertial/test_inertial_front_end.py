@@ -272,3 +272,16 @@ def test_walking_and_standing():
 def test_wrong_parameters_are_refused_by_name(wrong):
     with pytest.raises(ConfigError, match=next(iter(wrong))):
         InertialConfig(**wrong)
+
+
+@pytest.mark.parametrize("sensor", ["acceleration", "rotation_rate", "magnetic_field", "orientation"])
+def test_one_absurd_sample_costs_that_sample(sensor):
+    recording = walk(steps=40)
+    series: Series = getattr(recording, sensor)
+    values = series.values.copy()
+    values[len(values) // 3] = 1e200
+    spoilt = run(replace(recording, **{sensor: Series(series.t, values)}))
+    clean = run(recording)
+    assert abs(len(spoilt.t) - len(clean.t)) <= 1
+    assert np.all(np.isfinite(spoilt.heading))
+    assert np.max(np.abs(wrap(spoilt.heading[-5:] - clean.heading[-5:]))) < 0.05

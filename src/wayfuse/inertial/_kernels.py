@@ -329,7 +329,8 @@ def consume(
     s: Array, p: Array, kind: int, t: float, a: float, b: float, c: float, d: float, event: Array
 ) -> bool:
     """Feed one record of a kind; True when it completes a step, written to ``event`` (N_EVENT,)."""
-    if not (np.isfinite(t) and np.isfinite(a) and np.isfinite(b) and np.isfinite(c) and np.isfinite(d)):
+    # NaN compares false; 1e6 of any unit is a fault, and would stay in the filters for good
+    if not (np.isfinite(t) and abs(a) < 1e6 and abs(b) < 1e6 and abs(c) < 1e6 and abs(d) < 1e6):
         return False
     elapsed = t - s[at.S_T_ACC + kind]
     if -p[at.P_GAP] < elapsed < 0.0:  # late: what came after it has been used

@@ -51,7 +51,9 @@ class Series:
 
     def __post_init__(self) -> None:
         if self.t.ndim != 1 or self.values.ndim != 2 or len(self.t) != len(self.values):
-            raise ConfigError(f"a series needs t (n,) and values (n, k), got {self.t.shape}, {self.values.shape}")
+            raise ConfigError(
+                f"a series needs t (n,) and values (n, k), got {self.t.shape}, {self.values.shape}"
+            )
 
     def __len__(self) -> int:
         return len(self.t)
