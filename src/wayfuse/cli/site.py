@@ -16,6 +16,7 @@ __all__ = ["site"]
 # name of a building format -> module of its importer: import_site(path) -> (site, report)
 IMPORTERS = {
     "ms-indoor": "wayfuse.maps.importers.ms_indoor",
+    "imdf": "wayfuse.maps.importers.imdf",
     "osm": "wayfuse.maps.importers.osm",
 }
 
@@ -36,6 +37,8 @@ def import_command(plan_format: str, path: Path, out: Path, overwrite: bool, as_
 
     FORMAT ms-indoor: PATH is a folder that holds one folder per floor (B1, F1, ...) with floor_info.json
     and geojson_map.json.
+
+    FORMAT imdf: PATH is a ZIP archive of the Indoor Mapping Data Format 1.0.0.
 
     FORMAT osm: PATH is a building of OpenStreetMap with Simple Indoor Tagging, .osm or .geojson.
     """

@@ -31,7 +31,7 @@ from wayfuse.maps.levels import parse_level, sort_key
 from wayfuse.maps.site import Floor, Polygon, Site, Unit
 from wayfuse.maps.walls import LARGEST
 
-__all__ = ["FloorReport", "ImportReport", "import_site"]
+__all__ = ["import_site"]
 
 SPHERE_RADIUS = 6378137.0  # m, of Web-Mercator
 RESIDUAL_LIMIT = 1.0  # m, a larger disagreement of picture and outline is reported

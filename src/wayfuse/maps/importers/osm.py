@@ -2,9 +2,9 @@
 
 Rooms (`indoor=room`), corridors and areas are units people walk in. A room has walls along its edge, open where
 a `door=*` or `entrance=*` node lies on it; the edge of a corridor or area is a wall only where nothing adjoins,
-for its neighbours carry the walls. `indoor=wall` ways are walls, closed ones solid. `level` and `repeat_on` take
-lists and ranges ("0;1", "-1-3"); an object drawn for several levels is a unit of each. Parts of levels ("0.5")
-have no floor of their own and are left out, nor have levels of stairs and lifts only.
+for its neighbours carry the walls. `indoor=wall` ways are walls, closed ones solid units `wall`. `level` and
+`repeat_on` take lists and ranges ("0;1", "-1-3"); an object drawn for several levels is a unit of each. Parts of
+levels ("0.5") have no floor of their own and are left out, nor have levels of stairs and lifts only.
 
 Connectors (stairs, escalators, lifts) are units of every level they serve; provenance lists those levels. Steps
 drawn as a line get their `width`, else `STAIRS_WIDTH`; a lift drawn as a point is a square of `LIFT_SIZE`.
@@ -121,7 +121,7 @@ def _provenance(path: Path, drawn: list[Element], levels: Mapping[int, _Level]) 
     served = {
         e.id: {"category": _category(e), "levels": [k for k in _levels(e) if k in levels]}
         for e in drawn
-        if _category(e) in CONNECTORS
+        if _category(e) in CONNECTORS and not levels.keys().isdisjoint(_levels(e))
     }
     return {
         "importer": "osm",
@@ -170,11 +170,10 @@ def _draw(element: Element, anchor: GeoAnchor, levels: Mapping[int, _Level]) -> 
         return True
     for i, level in enumerate(where):
         for polygon in _polygons(element, anchor, level.warnings if i == 0 else []):
-            if not category:
-                level.solid.append(polygon)
-                continue
             unit = Unit(element.id, _name(element.tags), _kind(element, category), polygon)
             level.units.append(unit)
+            if not category:
+                level.solid.append(polygon)
             if element.tags.get("indoor") == "room":
                 level.rooms.append(unit)
     return True
@@ -188,7 +187,7 @@ def _kind(element: Element, category: str) -> str:
     """Category of a unit: that of a room says what it is for where the tags do."""
     tags = element.tags
     if category != "room":
-        return category
+        return category or "wall"
     if "toilets" in (tags.get("room"), tags.get("amenity")):
         return "toilet"
     if "shop" in tags:
@@ -242,7 +241,7 @@ def _build(
 ) -> tuple[Floor, FloorReport] | None:
     import shapely
 
-    outline = outline_of(unit.polygon for unit in drawn.units)
+    outline = outline_of(unit.polygon for unit in drawn.units if unit.category != "wall")
     if not outline:
         return None
     doors = shapely.union_all(drawn.doors)
@@ -260,7 +259,7 @@ def _build(
         level,
         outline,
         drawn.units,
-        walls=cut_walls([*walled, *drawn.solid], drawn.lines, drawn.doors),
+        walls=cut_walls([*outline, *walled, *drawn.solid], drawn.lines, drawn.doors),
         closed=drawn.solid,
         width=float(size[0]),
         height=float(size[1]),

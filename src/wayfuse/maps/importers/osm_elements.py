@@ -14,6 +14,7 @@ import numpy as np
 
 from wayfuse.core.errors import MapError
 from wayfuse.core.types import Array
+from wayfuse.maps.importers import geojson
 from wayfuse.maps.importers.plan_file import parse_json, parse_xml, read_limited
 
 __all__ = ["Element", "read_elements"]
@@ -147,26 +148,13 @@ def _from_geojson(document: Any, path: Path, warnings: list[str]) -> list[Elemen
 
 
 def _shape(ident: str, tags: Mapping[str, str], feature: Any) -> Element | None:
+    if parts := geojson.polygons(feature):
+        return Element(ident, tags, line=parts[0][0], polygons=parts)
+    if (points := geojson.line(feature)) is not None:
+        return Element(ident, tags, line=points)
     try:
-        kind, drawn = feature["geometry"]["type"], feature["geometry"]["coordinates"]
-        match kind:
-            case "Point":
-                return Element(ident, tags, point=_lonlat([drawn])[0])
-            case "LineString":
-                return Element(ident, tags, line=_lonlat(drawn))
-            case "Polygon" | "MultiPolygon":
-                parts = [drawn] if kind == "Polygon" else drawn
-                polygons = tuple(tuple(_lonlat(ring) for ring in part) for part in parts)
-                if not polygons or not all(polygons):
-                    return None
-                return Element(ident, tags, line=polygons[0][0], polygons=polygons)
+        if feature["geometry"]["type"] == "Point":
+            return Element(ident, tags, point=geojson.lonlat([feature["geometry"]["coordinates"]])[0])
     except (KeyError, TypeError, ValueError, IndexError):
         return None
     return None
-
-
-def _lonlat(points: Any) -> Array:
-    places = np.array([p[:2] for p in points], dtype=np.float64)
-    if places.ndim != 2 or places.shape[1] != 2 or not np.all(np.abs(places) <= (180.0, 90.0)):
-        raise ValueError("not places on the earth")
-    return places

@@ -1,0 +1,248 @@
+"""Import a venue in the Indoor Mapping Data Format 1.0.0 (OGC 20-094): a ZIP archive of GeoJSON files.
+
+A floor is all levels of one ordinal; its outline is theirs. Units are walked in, except walls, columns, voids and
+plants (`CLOSED`). Walls are the outline and the edges of the units that enclose (all but those in `OPEN`), without
+the parts where an opening lies; space of a level without units is open. Stairs, lifts and other connectors are
+units; provenance lists the levels that relationships join.
+
+An archive of `wayfuse.maps.importers.imdf_write` carries its own properties ("wayfuse:...") and comes back as it
+was.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from wayfuse.core.errors import MapError
+from wayfuse.core.frames import GeoAnchor
+from wayfuse.core.types import Array
+from wayfuse.maps.build import build_floor, nominal_elevation
+from wayfuse.maps.importers import geojson
+from wayfuse.maps.importers.imdf_archive import read_archive
+from wayfuse.maps.importers.report import FloorReport, ImportReport
+from wayfuse.maps.importers.rooms import anchor_residual, cleaned, cut_walls, local_anchor
+from wayfuse.maps.site import Floor, Polygon, Site, Unit
+
+__all__ = ["CLOSED", "CONNECTORS", "OPEN", "import_site"]
+
+# categories nobody walks in
+CLOSED = frozenset(
+    ("brick", "column", "concrete", "drywall", "glass", "opentobelow", "structure", "vegetation", "wood")
+)
+CONNECTORS = frozenset(("elevator", "escalator", "movingwalkway", "ramp", "stairs", "steps"))
+# categories whose edge is no wall
+OPEN = CONNECTORS | {
+    *("fieldofplay", "footbridge", "lobby", "parking", "platform", "road", "terrace", "unenclosedarea"),
+    *("unspecified", "waitingroom", "walkway", "walkway.island"),
+}
+OPENING_DEPTH = 0.025  # m, an opening cuts walls this near: it is drawn on the edges it opens
+LEVEL_LIMIT = 200  # ordinals beyond are a mistake
+
+
+@dataclass(slots=True)
+class _Level:
+    """What is drawn of one ordinal (degrees)."""
+
+    name: str
+    outline: list[tuple[Array, ...]] = field(default_factory=list)
+    units: list[tuple[dict[str, Any], tuple[tuple[Array, ...], ...]]] = field(default_factory=list)
+    openings: list[Array] = field(default_factory=list)
+    elevation: float | None = None
+
+
+def import_site(path: Path) -> tuple[Site, ImportReport]:
+    """Site of an IMDF archive, all floors in one frame, and what was met on the way.
+
+    Raises
+    ------
+    MapError : the archive cannot be read, is of another version, or has no level with an outline.
+    """
+    path = Path(path)
+    files = read_archive(path)
+    manifest = files["manifest"]
+    version = manifest.get("version") if isinstance(manifest, dict) else None
+    if not isinstance(version, str) or not version.startswith("1.0."):
+        raise MapError(f"IMDF version {version!r}, known is 1.0.0", where=path, remedy="export IMDF 1.0.0")
+    language = str(manifest.get("language", "en"))
+    notes: list[str] = []
+    levels, ordinals = _levels(path, files, language, notes)
+    _add_units(path, files, levels, ordinals, notes)
+    _add_openings(path, files, levels, ordinals, notes)
+    points = np.concatenate([rings[0] for level in levels.values() for rings in level.outline])
+    anchor = local_anchor(points, path)
+    size = anchor.to_xy(points.max(axis=0))
+    built = [_build(k, levels[k], anchor, size, language, 0 in levels) for k in sorted(levels)]
+    floors = [item for item in built if item is not None]
+    if not floors:
+        raise MapError("no level encloses an area", where=path, remedy="export the venue anew")
+    venue = _features(path, files, "venue")
+    name = _label(_properties(venue[0]).get("name"), language) if venue else ""
+    provenance = {
+        "importer": "imdf",
+        "source": path.name,
+        "frame": "metres east and north of the south-west corner of all levels",
+        "connectors": json.dumps(_connectors(path, files, ordinals)),
+    }
+    site = Site(name or path.stem, tuple(floor for floor, _ in floors), provenance)
+    return site, ImportReport(tuple(report for _, report in floors), tuple(notes))
+
+
+def _features(path: Path, files: Mapping[str, Any], kind: str) -> list[Any]:
+    if kind not in files:
+        return []
+    document = files[kind]
+    features = document.get("features") if isinstance(document, dict) else None
+    if not isinstance(features, list):
+        raise MapError(
+            "is not a FeatureCollection", where=f"{path}: {kind}.geojson", remedy="export the venue anew"
+        )
+    return features
+
+
+def _properties(feature: Any) -> dict[str, Any]:
+    held = feature.get("properties") if isinstance(feature, dict) else None
+    return held if isinstance(held, dict) else {}
+
+
+def _label(labels: Any, language: str) -> str:
+    """Text of a label in the language of the archive, else in any."""
+    if not isinstance(labels, dict) or not labels:
+        return ""
+    return str(labels.get(language) or next(iter(labels.values())) or "")
+
+
+def _levels(
+    path: Path, files: Mapping[str, Any], language: str, notes: list[str]
+) -> tuple[dict[int, _Level], dict[str, int]]:
+    """Levels by ordinal, and the ordinal of each level id."""
+    levels: dict[int, _Level] = {}
+    ordinals: dict[str, int] = {}
+    for feature in _features(path, files, "level"):
+        properties = _properties(feature)
+        ident = str(feature.get("id", "")) if isinstance(feature, dict) else ""
+        ordinal, parts = properties.get("ordinal"), geojson.polygons(feature)
+        if not isinstance(ordinal, int) or abs(ordinal) > LEVEL_LIMIT or not parts:
+            notes.append(f"level {ident}: no polygon on the earth, or no whole ordinal: left out")
+            continue
+        name = _label(properties.get("short_name"), language) or _label(properties.get("name"), language)
+        taken = {level.name.casefold() for level in levels.values()}
+        if name.casefold() in taken:
+            name = f"{name} ({ordinal})"
+        level = levels.setdefault(ordinal, _Level(name or str(ordinal)))
+        level.outline += parts
+        elevation = properties.get("wayfuse:elevation")
+        if isinstance(elevation, float):
+            level.elevation = elevation
+        ordinals[ident] = ordinal
+    if not levels:
+        raise MapError("holds no level with an outline", where=path, remedy="name an IMDF archive")
+    return levels, ordinals
+
+
+def _add_units(
+    path: Path,
+    files: Mapping[str, Any],
+    levels: Mapping[int, _Level],
+    ordinals: Mapping[str, int],
+    notes: list[str],
+) -> None:
+    for feature in _features(path, files, "unit"):
+        properties, parts = _properties(feature), geojson.polygons(feature)
+        ident = str(feature.get("id", "")) if isinstance(feature, dict) else ""
+        ordinal = ordinals.get(str(properties.get("level_id")))
+        if ordinal is None or not parts:
+            notes.append(f"unit {ident}: no polygon on the earth, or no known level: left out")
+        else:
+            levels[ordinal].units.append(({**properties, "id": ident}, parts))
+
+
+def _add_openings(
+    path: Path,
+    files: Mapping[str, Any],
+    levels: Mapping[int, _Level],
+    ordinals: Mapping[str, int],
+    notes: list[str],
+) -> None:
+    for feature in _features(path, files, "opening"):
+        points = geojson.line(feature)
+        ordinal = ordinals.get(str(_properties(feature).get("level_id")))
+        if ordinal is None or points is None:
+            ident = feature.get("id", "") if isinstance(feature, dict) else ""
+            notes.append(f"opening {ident}: no line on the earth, or no known level: left out")
+        else:
+            levels[ordinal].openings.append(points)
+
+
+def _connectors(path: Path, files: Mapping[str, Any], ordinals: Mapping[str, int]) -> dict[str, Any]:
+    """Levels that relationships join through units, by the id of the relationship."""
+    level_of: dict[str, int] = {}
+    source: dict[str, str] = {}
+    for feature in _features(path, files, "unit"):
+        properties = _properties(feature)
+        ordinal = ordinals.get(str(properties.get("level_id")))
+        if ordinal is not None:
+            ident = str(feature.get("id", ""))
+            level_of[ident] = ordinal
+            source[ident] = str(properties.get("wayfuse:id") or ident)
+    found: dict[str, Any] = {}
+    for feature in _features(path, files, "relationship"):
+        properties = _properties(feature)
+        ends: Sequence[Any] = [properties.get("origin"), properties.get("destination")]
+        middle = properties.get("intermediary")
+        refs = [*ends, *(middle if isinstance(middle, list) else [])]
+        units = [str(ref.get("id")) for ref in refs if isinstance(ref, dict)]
+        joined = sorted({level_of[unit] for unit in units if unit in level_of})
+        if len(joined) > 1:
+            name = next(source[unit] for unit in units if unit in source)
+            found[name] = {"category": str(properties.get("category", "")), "levels": joined}
+    return found
+
+
+def _build(
+    ordinal: int, level: _Level, anchor: GeoAnchor, size: Array, language: str, has_ground: bool
+) -> tuple[Floor, FloorReport] | None:
+    import shapely
+
+    warnings: list[str] = []
+
+    def metres(parts: Sequence[tuple[Array, ...]], what: str) -> list[Polygon]:
+        drawn = [[anchor.to_xy(ring) for ring in rings] for rings in parts]
+        return [polygon for rings in drawn for polygon in cleaned(rings, what, warnings)]
+
+    outline = metres(level.outline, f"level {level.name}")
+    if not outline:
+        return None
+    units, closed, walled = [], [], []
+    for properties, parts in level.units:
+        category = str(properties.get("wayfuse:category") or properties.get("category") or "unspecified")
+        kind = str(properties.get("category"))
+        name, ident = _label(properties.get("name"), language), properties["id"]
+        for polygon in metres(parts, f"unit {ident}"):
+            units.append(Unit(str(properties.get("wayfuse:id") or ident), name, category, polygon))
+            if properties.get("wayfuse:closed", kind in CLOSED) is True:
+                closed.append(polygon)
+            if properties.get("wayfuse:enclosed", kind not in OPEN) is True:
+                walled.append(polygon)
+    doors = [shapely.LineString(anchor.to_xy(o)) for o in level.openings]
+    gaps = [door.buffer(OPENING_DEPTH, cap_style="flat") for door in doors]
+    floor = build_floor(
+        level.name,
+        ordinal,
+        outline,
+        units,
+        walls=cut_walls([*outline, *walled], [], gaps),
+        closed=closed,
+        width=float(size[0]),
+        height=float(size[1]),
+        elevation=nominal_elevation(ordinal, has_ground=has_ground)
+        if level.elevation is None
+        else level.elevation,
+        anchor=anchor,
+    )
+    return floor, FloorReport(floor.name, anchor_residual(anchor, size), tuple(warnings))
