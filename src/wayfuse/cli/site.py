@@ -16,6 +16,7 @@ __all__ = ["site"]
 # name of a building format -> module of its importer: import_site(path) -> (site, report)
 IMPORTERS = {
     "ms-indoor": "wayfuse.maps.importers.ms_indoor",
+    "image": "wayfuse.maps.importers.image",
     "imdf": "wayfuse.maps.importers.imdf",
     "osm": "wayfuse.maps.importers.osm",
 }
@@ -37,6 +38,9 @@ def import_command(plan_format: str, path: Path, out: Path, overwrite: bool, as_
 
     FORMAT ms-indoor: PATH is a folder that holds one folder per floor (B1, F1, ...) with floor_info.json
     and geojson_map.json.
+
+    FORMAT image: PATH is a TOML or JSON file that names a picture of each floor, its width in metres or
+    control points, and traced walls.
 
     FORMAT imdf: PATH is a ZIP archive of the Indoor Mapping Data Format 1.0.0.
 
