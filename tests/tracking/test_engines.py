@@ -145,3 +145,27 @@ def test_wrong_parameters_are_refused(world: Any) -> None:
         Summary(scale_68=0.0)
     with pytest.raises(ConfigError, match="n_particles must be at least 10"):
         fused.build(world.site, world.survey, fused.Config(n_particles=3))
+
+
+def test_without_motion_sensors_fused_moves_like_the_random_walk(world: Any) -> None:
+    engine = fused.build(world.site, world.survey).engine
+    sharp = fused.build(world.site, world.survey, fused.Config(quiet_exponent=9.0)).engine
+    scan = world.walks[0].wifi[0]
+    tracker = fused.build(world.site, world.survey)
+    _, fingerprint = tracker.scan_buffer.step(tracker.scan_buffer.init(), scan)
+    assert fingerprint is not None
+
+    def after(engine: Any, *, quiet: bool) -> Any:
+        state = engine.on_fingerprint(engine.init("x", 0), scan.t, fingerprint, heading_known=True)
+        if quiet:
+            state = engine.on_quiet(state, 1.0)
+            assert state.is_quiet
+        else:
+            state = engine.on_step(state, step(0.7, 0.3), heading_known=True)
+            assert not state.is_quiet
+        return engine.on_fingerprint(state, scan.t + 1.0, fingerprint, heading_known=True)
+
+    assert after(sharp, quiet=True).ess < after(engine, quiet=True).ess < 1.0
+    assert after(sharp, quiet=False).ess == after(engine, quiet=False).ess
+    state = engine.on_step(after(engine, quiet=True), step(0.7, 0.3), heading_known=True)
+    assert not state.is_quiet  # the first step ends it

@@ -138,7 +138,7 @@ def test_a_cloud_that_spreads_is_lost_once_it_was_settled(world: Any) -> None:
     # six scans, no motion sensors, then nothing for minutes: the cloud diffuses over the house
     deaf = Recording(recording.name, wifi=(*recording.wifi[:6], far))
     tracker = fused.build(world.site, world.survey)
-    engine = replace(tracker.engine, recovery=Recovery(settled=15.0, lost=LOST_AT))
+    engine = replace(tracker.engine, recovery=Recovery(lost=LOST_AT))
     estimates = replace(tracker, engine=engine).run(deaf).estimates
     settled = next(i for i, e in enumerate(estimates) if e.state is State.TRACKING)
     for e in estimates[:settled]:

@@ -21,7 +21,6 @@ __all__ = ["RANDOM_WALK", "dead_reckoning", "nnss", "random_walk", "wknn"]
 RANDOM_WALK = Config(
     use_steps=False,
     map_constraint="none",
-    diffusion=4.0,
     exponent=2.0,
     coverage_gain=0.0,
     injection=0.01,

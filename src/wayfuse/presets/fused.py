@@ -61,7 +61,8 @@ class Config:
     first_scale_sigma: float = 0.09  # per-walk mean step against the model
     injection: float = 0.005  # share of particles per scan
     penalty: float = 1.2  # nats per blocked move
-    diffusion: float = 1.2  # m per root second, where motion sensors are silent
+    diffusion: float = 4.0  # m per root second and axis, where motion sensors are silent
+    quiet_exponent: float = 2.0  # tempering there; both as the random walk tuned for itself
     map_constraint: Literal["walkable", "barriers", "none"] = "walkable"
     use_steps: bool = True
     summary: Summary = field(default_factory=lambda: CALIBRATED)
@@ -108,6 +109,7 @@ def build(
         recovery=Recovery(injection=c.injection),
         summary=c.summary,
         n_particles=c.n_particles,
+        quiet_gain=c.quiet_exponent / c.exponent,
         uses_steps=c.use_steps,
         rotation=site.anchor.rotation if site.anchor is not None else 0.0,
     )

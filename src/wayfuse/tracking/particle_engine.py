@@ -64,6 +64,7 @@ class ParticleState(NamedTuple):
     is_settled: bool = False
     ess: float = 1.0
     marks: tuple[float, ...] = ()
+    is_quiet: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -73,7 +74,8 @@ class ParticleEngine:
     Parameters
     ----------
     radio_map : answers scans. observation, motion, first, constraint : the models; constraint None = no map.
-    diffusion : motion while no motion sensor speaks. uses_steps : False = steps are ignored, diffusion always.
+    diffusion : motion while no motion sensor speaks; ``quiet_gain`` multiplies the log-likelihood of a scan then, for
+    without steps the cloud forgets fast and the scan before says little. uses_steps : False = diffusion always.
     rotation : rad, heading of building +x from east (headings arrive counter-clockwise from east).
     """
 
@@ -89,6 +91,7 @@ class ParticleEngine:
     summary: Summary = field(default_factory=Summary)
     n_particles: int = 1000
     uses_steps: bool = True
+    quiet_gain: float = 1.0
     rotation: float = 0.0
     uses_scans: bool = True
     supports_lag: bool = True
@@ -110,14 +113,14 @@ class ParticleEngine:
         why = state.why._replace(n_steps=state.why.n_steps + 1)
         step = StepInput(event.length, event.heading - self.rotation)
         after, n_blocked = self.filter.predict(state.key, state.filter, self.motion, step, self.constraint)
-        return self._moved(state, after, n_blocked, why)
+        return self._moved(state, after, n_blocked, why)._replace(is_quiet=False)
 
     def on_quiet(self, state: ParticleState, dt: float) -> ParticleState:
-        """Diffuse."""
+        """Diffuse, unconstrained: a second's displacement is no step, and walls would only trap it."""
         if state.filter is None or dt <= 0.0:
             return state
-        after, n_blocked = self.filter.predict(state.key, state.filter, self.diffusion, dt, self.constraint)
-        return self._moved(state, after, n_blocked, state.why)
+        after, _ = self.filter.predict(state.key, state.filter, self.diffusion, dt, None)
+        return self._moved(state, after, 0, state.why)._replace(is_quiet=True)
 
     def on_fingerprint(
         self,
@@ -140,6 +143,8 @@ class ParticleEngine:
         log_likelihood = np.zeros(self.n_particles)
         self.observation.log_likelihood(state.filter.cloud, near, log_likelihood)
         agreement = self.observation.agreement(state.filter.weights, log_likelihood, near)
+        if state.is_quiet:
+            log_likelihood *= self.quiet_gain
         inject = self.recovery.injection > 0.0
         after, info = self.filter.update(state.key, state.filter, log_likelihood, always_resample=inject)
         contradictions = state.contradictions + 1 if agreement < self.recovery.agreement else 0
