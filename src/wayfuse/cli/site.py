@@ -16,6 +16,7 @@ __all__ = ["site"]
 # name of a building format -> module of its importer: import_site(path) -> (site, report)
 IMPORTERS = {
     "ms-indoor": "wayfuse.maps.importers.ms_indoor",
+    "hcu": "wayfuse.maps.importers.hcu",
     "image": "wayfuse.maps.importers.image",
     "imdf": "wayfuse.maps.importers.imdf",
     "osm": "wayfuse.maps.importers.osm",
@@ -38,6 +39,8 @@ def import_command(plan_format: str, path: Path, out: Path, overwrite: bool, as_
 
     FORMAT ms-indoor: PATH is a folder that holds one folder per floor (B1, F1, ...) with floor_info.json
     and geojson_map.json.
+
+    FORMAT hcu: PATH is a folder with PlanEG.geojson, Plan1OG.geojson, ... of the HCU Hamburg data set.
 
     FORMAT image: PATH is a TOML or JSON file that names a picture of each floor, its width in metres or
     control points, and traced walls.

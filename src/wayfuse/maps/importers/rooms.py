@@ -71,9 +71,9 @@ def to_shapely(polygons: Iterable[Polygon]) -> Any:
     return shapely.union_all([shapely.Polygon(p.exterior, [*p.holes]) for p in polygons])
 
 
-def outline_of(polygons: Iterable[Polygon]) -> tuple[Polygon, ...]:
-    """What some polygons cover together, with the walls between them (gaps up to `WALL_GAP`)."""
-    half = 0.5 * WALL_GAP
+def outline_of(polygons: Iterable[Polygon], gap: float = WALL_GAP) -> tuple[Polygon, ...]:
+    """What some polygons cover together, with the walls between them (gaps up to ``gap`` m)."""
+    half = 0.5 * gap
     whole = to_shapely(polygons)
     closed = whole.buffer(half, join_style="mitre").buffer(-half, join_style="mitre").union(whole)
     return from_shapely(_snapped(closed))
