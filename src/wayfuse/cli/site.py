@@ -20,6 +20,7 @@ IMPORTERS = {
     "image": "wayfuse.maps.importers.image",
     "imdf": "wayfuse.maps.importers.imdf",
     "osm": "wayfuse.maps.importers.osm",
+    "simpleloc": "wayfuse.maps.importers.simpleloc",
 }
 
 
@@ -48,6 +49,8 @@ def import_command(plan_format: str, path: Path, out: Path, overwrite: bool, as_
     FORMAT imdf: PATH is a ZIP archive of the Indoor Mapping Data Format 1.0.0.
 
     FORMAT osm: PATH is a building of OpenStreetMap with Simple Indoor Tagging, .osm or .geojson.
+
+    FORMAT simpleloc: PATH is the building.xml of a simpleLoc data set.
     """
     import importlib
 
