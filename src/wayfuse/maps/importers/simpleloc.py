@@ -2,7 +2,7 @@
 
 The outline of a floor is its polygons of method 0 less those of method 1. `wall` and `line` (a handrail) are walls;
 a `door` of a wall is an opening of its `width` from the share `x01` of the wall, towards its start where `lr` is
-true (so all 117 doors of the public file lie on their walls). Each `stair` is a unit of its floor and, where its
+true (so all 116 doors of the public file lie on their walls). Each `stair` is a unit of its floor and, where its
 last `z2` reaches it, of the one above; provenance lists the levels. Floors are sorted by `atHeight`, their
 elevation. Rooms are not drawn as areas, so connectors are the only units. The file names no place on the earth; x is
 taken as right and y as up.
