@@ -87,6 +87,12 @@ def test_walls_are_areas_with_doors_between_them(tmp_path):
     np.testing.assert_allclose(floor.to_lonlat([12.0, 7.0]), place, atol=1e-9)
 
 
+def test_rooms_without_a_door_are_counted(tmp_path):
+    found = [area("Wall", box(9, 5, 10, 5.2)) if f["properties"]["Type"] == "Door" else f for f in features()]
+    _, report = import_site(write(tmp_path / "hcu", found=found))
+    assert report.floors[0].warnings == ("1 parts (96 m2) have no door to the largest",)
+
+
 def test_floors_share_a_frame_and_stand_in_order(tmp_path):
     write(tmp_path / "hcu", "2OG", [area("Room", box(-5, 0, 5, 5))])
     write(tmp_path / "hcu", "UG", [area("Room", box(0, -5, 5, 5))])

@@ -20,7 +20,7 @@ from wayfuse.core.errors import MapError
 from wayfuse.core.frames import GeoAnchor
 from wayfuse.core.types import Array
 from wayfuse.maps.build import build_floor, nominal_elevation
-from wayfuse.maps.geometry import edges, free_space
+from wayfuse.maps.geometry import edges, free_space, from_shapely
 from wayfuse.maps.importers.plan_file import parse_json, read_limited
 from wayfuse.maps.importers.report import FloorReport, ImportReport
 from wayfuse.maps.importers.rooms import cleaned, outline_of
@@ -200,12 +200,16 @@ def _floor(plan: _Plan, corner: Array, size: Array, anchor: GeoAnchor, elevation
     outline = outline_of(drawn, SEAM)
     if not outline:
         raise MapError("its areas enclose nothing", where=plan.path, remedy="fetch the data anew")
+    free = free_space(outline, closed, widening=0.0)
+    apart = sorted(part.area for part in from_shapely(free))[:-1]
+    if apart:
+        plan.warnings.append(f"{len(apart)} parts ({sum(apart):.0f} m2) have no door to the largest")
     return build_floor(
         name,
         plan.level,
         outline,
         units,
-        walls=edges(free_space(outline, closed, widening=0.0)),
+        walls=edges(free),
         closed=closed,
         width=float(size[0]),
         height=float(size[1]),
