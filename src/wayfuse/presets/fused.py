@@ -50,7 +50,7 @@ class Config:
     temperature: float = 0.02  # of the neighbours' weights, in signal distance
     bands: tuple[tuple[int, int], ...] = ()  # MHz; empty = both
     sigma: float = 4.0  # m, kernel at a neighbour
-    background: float = 0.08
+    background: float = 0.05
     exponent: float = 0.45  # tempering: errors of successive scans are much alike
     coverage_gain: float = 1.5  # nats
     length_sigma: float = 0.15  # relative, per step
