@@ -22,7 +22,7 @@ class Barriers:
     Parameters
     ----------
     indices : wall index of each floor, bottom up.
-    penalty : nats lost per blocked move. Soft, because plans lack doors; 0.3 to 3 made no difference on ms-indoor.
+    penalty : nats lost per blocked move. Soft, because plans lack doors.
     """
 
     indices: tuple[WallIndex, ...]

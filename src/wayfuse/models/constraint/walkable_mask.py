@@ -1,8 +1,8 @@
 """The walkable mask stops particles: the middle and the end of each move are looked up.
 
 Coarser than `barriers`: it lets a particle jump over what is thinner than half a step. On the public floor plans that
-is a virtue: they show shops without doors, and 2 % of the surveyors' own lines cross a drawn barrier, which an exact
-test forbids for good (ms-indoor development folds: mean error 3.9 m with the mask, 4.2 m with barriers). For plans
+is a virtue: they show shops without doors, and some of the surveyors' own lines cross a drawn barrier, which an exact
+test forbids for good (rows ``fused`` and ``fused-barriers`` of docs/results.md). For plans
 with doors and true walls use `Barriers`.
 """
 
@@ -28,7 +28,7 @@ class WalkableMask:
 
     Parameters
     ----------
-    masks : walkable mask of each floor, bottom up. penalty : nats lost per blocked move (0.3 to 3 made no difference).
+    masks : walkable mask of each floor, bottom up. penalty : nats lost per blocked move.
     """
 
     masks: tuple[Walkable, ...]
