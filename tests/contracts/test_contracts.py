@@ -23,6 +23,7 @@ from wayfuse.models.motion.random_walk import RandomWalk
 from wayfuse.models.observation.coverage import SurveyDistance
 from wayfuse.models.observation.fingerprint import FingerprintLikelihood
 from wayfuse.presets import baselines, fused
+from wayfuse.presets.methods import build_method
 from wayfuse.radio.sparse_knn import SparseKnn
 from wayfuse.radio.survey import Fingerprint
 from wayfuse.tracking.dead_reckoning import Start
@@ -49,8 +50,8 @@ METHODS: dict[str, Callable[[Any], Any]] = {
     "fused, lag": lambda w: fused.build(w.site, w.survey, FEW, lag=3.0),
     "barriers": lambda w: fused.build(w.site, w.survey, replace(FEW, map_constraint="barriers")),
     **{
-        f"no {part}": (lambda w, p=part: fused.build(w.site, w.survey, fused.without(FEW, p)))
-        for part in ("map", "steps", "2.4", "5")
+        name: (lambda w, n=name: build_method(n, w.site, w.survey, n_particles=N))
+        for name in ("fused-no-map", "fused-no-steps", "fused-2.4ghz", "fused-5ghz")
     },
     **{
         scheme: (lambda w, s=scheme: fused.build(w.site, w.survey, replace(FEW, resampling=s)))

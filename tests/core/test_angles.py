@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from wayfuse.core.angles import azimuth_from_heading, circular_mean, heading_from_azimuth, wrap
+from wayfuse.core.angles import azimuth_from_heading, heading_from_azimuth, wrap
 
 ANGLE = st.floats(-1e6, 1e6)
 
@@ -32,9 +32,3 @@ def test_azimuth_and_heading_are_inverse(heading: float) -> None:
 @pytest.mark.parametrize(("azimuth", "heading"), [(0, 90), (90, 0), (180, -90), (270, 180), (45, 45)])
 def test_compass_points(azimuth: float, heading: float) -> None:
     assert np.rad2deg(float(heading_from_azimuth(np.deg2rad(azimuth)))) == pytest.approx(heading)
-
-
-def test_circular_mean() -> None:
-    assert circular_mean(np.deg2rad([170.0, -170.0])) == pytest.approx(np.pi)
-    assert circular_mean([0.0, 1.0], [1.0, 0.0]) == 0.0
-    assert np.rad2deg(circular_mean(np.deg2rad([10.0, 40.0]), [1.0, 1.0])) == pytest.approx(25.0)

@@ -8,11 +8,13 @@ from typing import Any
 import numpy as np
 import pytest
 
+from wayfuse.cli.track import METHODS
 from wayfuse.core.errors import ConfigError, RadioMapError
 from wayfuse.models.constraint.barriers import Barriers
 from wayfuse.models.constraint.walkable_mask import WalkableMask
 from wayfuse.presets import baselines
-from wayfuse.presets.fused import BAND_2_4, BAND_5, Config, build, check_floors, prior_estimate, without
+from wayfuse.presets.fused import BAND_2_4, BAND_5, Config, build, check_floors, prior_estimate
+from wayfuse.presets.methods import CONFIGS, FIXES, build_method
 from wayfuse.radio.survey import Fingerprint
 from wayfuse.tracking.estimate import Estimate, State
 
@@ -37,7 +39,7 @@ def test_it_beats_each_of_its_parts(world: Any) -> None:
         baselines.nnss(world.site, world.survey),
         baselines.wknn(world.site, world.survey),
         baselines.random_walk(world.site, world.survey),
-        build(world.site, world.survey, without(Config(), "steps")),
+        build(world.site, world.survey, Config(use_steps=False)),
     ):
         assert whole < score(world, tracker)[0].mean()
 
@@ -62,23 +64,26 @@ def test_parts_can_be_left_out(world: Any) -> None:
         build(world.site, world.survey, replace(config, map_constraint="barriers")).engine.constraint,
         Barriers,
     )
-    bare = build(world.site, world.survey, without(config, "map")).engine
+    bare = build_method("fused-no-map", world.site, world.survey, n_particles=50).engine
+    assert bare.n_particles == 50
     assert bare.constraint is None
     assert bare.first.walkable == ()
-    assert build(world.site, world.survey, without(config, "steps")).engine.uses_steps is False
-    assert without(config, "2.4").bands == BAND_5
-    assert without(config, "5").bands == BAND_2_4
-    for part in ("map", "steps", "2.4", "5"):
-        assert without(config, part) != config
-        assert without(config, part).n_particles == 50
+    assert build_method("fused-no-steps", world.site, world.survey).engine.uses_steps is False
+    assert CONFIGS["fused-2.4ghz"].bands == BAND_2_4
+    assert CONFIGS["fused-5ghz"].bands == BAND_5
+    assert all(CONFIGS[name] != CONFIGS["fused"] for name in CONFIGS if name != "fused")
     with pytest.raises(KeyError):
-        without(config, "roof")
+        build_method("fused-no-roof", world.site, world.survey)
+
+
+def test_every_method_of_the_command_line_can_be_built() -> None:
+    assert set(METHODS) - {"pdr"} <= {*CONFIGS, *FIXES}
 
 
 def test_one_band_uses_that_band_alone(world: Any) -> None:
     scan = world.walks[0].wifi[3]
-    for part, (low, high) in (("5", (2400, 2500)), ("2.4", (4900, 5925))):
-        radio_map = build(world.site, world.survey, without(Config(n_particles=50), part)).engine.radio_map
+    for name, (low, high) in (("fused-2.4ghz", (2400, 2500)), ("fused-5ghz", (4900, 5925))):
+        radio_map = build_method(name, world.site, world.survey, n_particles=50).engine.radio_map
         on = (scan.frequency >= low) & (scan.frequency < high)
         assert 5 < on.sum() < len(on) - 5
         whole, alone = (

@@ -14,14 +14,13 @@ if TYPE_CHECKING:
     from wayfuse.evaluation.estimates_file import WalkEstimates
     from wayfuse.maps.site import Site
     from wayfuse.models.observation.coverage import SurveyDistance
-    from wayfuse.radio.survey import Survey
     from wayfuse.radio.walk_survey import WalkRadioMap
     from wayfuse.sensors.quality import Verdict
     from wayfuse.sensors.recording import Recording
 
 __all__ = ["METHODS", "track"]
 
-# name -> what it is; built in `_tracker`
+# name -> what it is; built by `presets.methods`
 METHODS = {
     "fused": "steps, Wi-Fi and floor plan in a particle filter",
     "fused-no-map": "fused without the floor plan",
@@ -186,6 +185,7 @@ class _Worker:
         if self.loaded is None:
             from wayfuse.maps.site import Site
             from wayfuse.models.observation.coverage import SurveyDistance
+            from wayfuse.presets.methods import build_method
             from wayfuse.radio.walk_survey import load
 
             site = Site.load(self.paths[0])
@@ -194,7 +194,11 @@ class _Worker:
             survey = made.survey
             if "pdr" in self.methods:
                 _check_start(self.start, site)
-            trackers = {name: self._tracker(name, site, survey) for name in self.methods if name != "pdr"}
+            trackers = {
+                name: build_method(name, site, survey, n_particles=self.particles, lag=self.lag)
+                for name in self.methods
+                if name != "pdr"
+            }
             self.loaded = site, SurveyDistance.build(survey), trackers
         return self.loaded
 
@@ -232,27 +236,6 @@ class _Worker:
             if name == self.methods[0]:
                 result.verdicts = done.verdicts
         return result
-
-    def _tracker(self, name: str, site: Site, survey: Survey) -> Any:
-        from dataclasses import replace
-
-        from wayfuse.presets import baselines, fused
-
-        config = fused.Config(n_particles=self.particles)
-        if name in {"nnss", "wknn"}:
-            return getattr(baselines, name)(site, survey, lag=self.lag)
-        if name == "random-walk":
-            return fused.build(
-                site, survey, replace(baselines.RANDOM_WALK, n_particles=self.particles), lag=self.lag
-            )
-        changed = {
-            "fused": config,
-            "fused-no-map": fused.without(config, "map"),
-            "fused-no-steps": fused.without(config, "steps"),
-            "fused-2.4ghz": fused.without(config, "5"),
-            "fused-5ghz": fused.without(config, "2.4"),
-        }
-        return fused.build(site, survey, changed[name], lag=self.lag)
 
     def _dead_reckoning(self, site: Site, recording: Recording, result: _Result) -> Any:
         from wayfuse.core.errors import MapError

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 
 from wayfuse.core.types import Array
 
-__all__ = ["azimuth_from_heading", "circular_mean", "heading_from_azimuth", "wrap"]
+__all__ = ["azimuth_from_heading", "heading_from_azimuth", "wrap"]
 
 
 def wrap(angle: ArrayLike) -> Array:
@@ -30,10 +30,3 @@ def heading_from_azimuth(azimuth: ArrayLike) -> Array:
 def azimuth_from_heading(heading: ArrayLike) -> Array:
     """Azimuth in (-pi, pi] (rad, clockwise from north) of a heading (rad, counter-clockwise from east)."""
     return heading_from_azimuth(heading)
-
-
-def circular_mean(angle: ArrayLike, weight: ArrayLike | None = None) -> float:
-    """Direction of the weighted mean unit vector of angles (rad); 0 where they cancel."""
-    a = np.asarray(angle, dtype=np.float64)
-    w = np.ones_like(a) if weight is None else np.asarray(weight, dtype=np.float64)
-    return float(np.arctan2(np.sum(w * np.sin(a)), np.sum(w * np.cos(a))))

@@ -9,7 +9,7 @@ for tests that nothing was chosen on. Each recording is read once; surveys are b
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from hashlib import sha256
 from pathlib import Path
 from typing import Any, Protocol, TypeVar
@@ -23,7 +23,8 @@ from wayfuse.formats.reading import expand, read
 from wayfuse.maps.importers.ms_indoor import import_site
 from wayfuse.maps.site import Site
 from wayfuse.models.survey_walk import place_of, survey_walk
-from wayfuse.presets import baselines, fused
+from wayfuse.presets import baselines
+from wayfuse.presets.methods import build_method
 from wayfuse.radio.survey import Survey
 from wayfuse.radio.walk_survey import SurveyWalk, survey_from_walks
 from wayfuse.sensors.recording import Recording
@@ -52,7 +53,6 @@ METHODS: Mapping[str, bool] = {
     "nnss": False,
     "pdr": False,
 }
-_WITHOUT = {"fused-no-map": "map", "fused-no-steps": "steps", "fused-2.4ghz": "5", "fused-5ghz": "2.4"}
 
 S = TypeVar("S")
 T = TypeVar("T")
@@ -145,20 +145,9 @@ class _Reader:
 
 def build_tracker(name: str, site: Site, survey: Survey) -> Tracker[Any]:
     """The tracker of a method of `METHODS` (``pdr`` has one per walk)."""
-    config = fused.Config()
-    if name in _WITHOUT:
-        return fused.build(site, survey, fused.without(config, _WITHOUT[name]))
-    if name == "fused-barriers":
-        return fused.build(site, survey, replace(config, map_constraint="barriers"))
     if name == _LAGGED:
-        return fused.build(site, survey, config, lag=LAG)
-    plain: dict[str, Callable[[Site, Survey], Tracker[Any]]] = {
-        "fused": fused.build,
-        "random-walk": baselines.random_walk,
-        "wknn": baselines.wknn,
-        "nnss": baselines.nnss,
-    }
-    return plain[name](site, survey)
+        return build_method("fused", site, survey, lag=LAG)
+    return build_method(name, site, survey)
 
 
 class _Worker:

@@ -7,7 +7,7 @@ particle filter), chu2009 (floor plan as constraint), li2015 (step length per pa
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
@@ -157,14 +157,3 @@ def prior_estimate(site: Site) -> Estimate:
         float(r95),
         State.INITIALISING,
     )
-
-
-def without(config: Config, part: str) -> Config:
-    """The configuration without one of its parts: ``map``, ``steps``, ``2.4`` or ``5`` (GHz)."""
-    changes = {
-        "map": replace(config, map_constraint="none"),
-        "steps": replace(config, use_steps=False),
-        "2.4": replace(config, bands=BAND_5),
-        "5": replace(config, bands=BAND_2_4),
-    }
-    return changes[part]

@@ -57,7 +57,6 @@ class ParticleState(NamedTuple):
 
     key: tuple[int, int]
     filter: FilterState | None = None
-    draw: int = 0
     why: Why = Why()
     n_moves: int = 0
     contradictions: int = 0
@@ -136,10 +135,10 @@ class ParticleEngine:
             return state
         why = state.why._replace(n_aps=max(state.why.n_aps, near.n_aps))
         if state.filter is None:
-            noise = Noise(state.key, state.draw)
+            noise = Noise(state.key)
             cloud = self.first.draw(noise, near, self.n_particles, heading_known=heading_known)
             fresh = FilterState(cloud, np.zeros(self.n_particles), noise.draw)
-            return state._replace(filter=fresh, draw=noise.draw, why=why)
+            return state._replace(filter=fresh, why=why)
         log_likelihood = np.zeros(self.n_particles)
         self.observation.log_likelihood(state.filter.cloud, near, log_likelihood)
         agreement = self.observation.agreement(state.filter.weights, log_likelihood, near)
@@ -153,7 +152,7 @@ class ParticleEngine:
             share = self.recovery.reset_share
         after = self._inject(state.key, after, near, share, heading_known)
         ess = info.ess / self.n_particles
-        return state._replace(filter=after, draw=after.draw, why=why, contradictions=contradictions, ess=ess)
+        return state._replace(filter=after, why=why, contradictions=contradictions, ess=ess)
 
     def estimate(self, state: ParticleState, t: float) -> tuple[ParticleState, Estimate]:
         """Geometric median on the heaviest floor, with radii."""
@@ -185,7 +184,7 @@ class ParticleEngine:
         if n_blocked:  # penalties add up: without a scan for long all weight would end on a few particles
             after, _ = self.filter.update(state.key, after, np.zeros(self.n_particles))
         blocked = why._replace(share_blocked=why.share_blocked + n_blocked / self.n_particles)
-        return state._replace(filter=after, draw=after.draw, why=blocked, n_moves=state.n_moves + 1)
+        return state._replace(filter=after, why=blocked, n_moves=state.n_moves + 1)
 
     def _inject(
         self, key: tuple[int, int], state: FilterState, near: Neighbours, share: float, heading_known: bool
