@@ -19,6 +19,7 @@ from numpy.typing import ArrayLike
 from wayfuse.core.errors import MapError
 from wayfuse.core.frames import GeoAnchor
 from wayfuse.core.types import Array
+from wayfuse.maps.connectors import Connector
 from wayfuse.maps.walkable import Walkable
 from wayfuse.maps.walls import WallIndex
 
@@ -111,11 +112,13 @@ class Site:
     """A building: floors bottom up and what they were made of.
 
     provenance : free text by key (format, source folder, file checksums), saved with the site.
+    connectors : stairs, lifts, escalators and ramps between the floors.
     """
 
     name: str
     floors: tuple[Floor, ...]
     provenance: Mapping[str, str] = field(default_factory=dict)
+    connectors: tuple[Connector, ...] = ()
 
     def __post_init__(self) -> None:
         names = [floor.name for floor in self.floors]
@@ -123,6 +126,12 @@ class Site:
             raise MapError("a site needs at least one floor", where=self.name)
         if len(set(names)) != len(names):
             raise MapError(f"floor names repeat: {', '.join(names)}", where=self.name)
+        ids = [connector.id for connector in self.connectors]
+        if len(set(ids)) != len(ids):
+            raise MapError(f"connector ids repeat: {', '.join(sorted(ids))}", where=self.name)
+        for connector in self.connectors:
+            if connector.floors[0] < 0 or connector.floors[-1] >= len(names):
+                raise MapError(f"connector {connector.id} has a landing on no floor", where=self.name)
 
     @property
     def anchor(self) -> GeoAnchor | None:
