@@ -33,6 +33,7 @@ def build_floor(
     height: float | None = None,
     elevation: float | None = None,
     anchor: GeoAnchor | None = None,
+    doors: Array | None = None,
 ) -> Floor:
     """Floor of an outline and its units (m).
 
@@ -45,6 +46,7 @@ def build_floor(
         widened, and each wall is a barrier too.
     width, height : extent of the frame; without them the far corner of the outline.
     elevation : m; without it nominal by level.
+    doors : (d, 4) m, clear widths of doors; without them none are known.
 
     Raises
     ------
@@ -75,4 +77,5 @@ def build_floor(
         wall_index=WallIndex.build(segments),
         barrier_index=WallIndex.build(barriers),
         anchor=anchor,
+        doors=np.empty((0, 4)) if doors is None else normalise_walls(doors),
     )

@@ -69,6 +69,7 @@ class Floor:
     people are exact (of 3064 straight legs between surveyed waypoints in a mall, 5.3 % cross a wall and 1.9 %
     a barrier). On a plan of thin walls and doors the walls themselves, which leave the doors open.
     walkable, wall_index, barrier_index : derived tables. anchor : to WGS84, None where the plan has none.
+    doors : (d, 4) m like walls: the clear widths of doors and openings, where the plan has them.
     """
 
     name: str
@@ -84,6 +85,7 @@ class Floor:
     wall_index: WallIndex
     barrier_index: WallIndex
     anchor: GeoAnchor | None = None
+    doors: Array = field(default_factory=lambda: np.empty((0, 4)))
 
     @property
     def area(self) -> float:

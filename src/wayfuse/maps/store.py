@@ -1,12 +1,12 @@
 """A site in a folder: what is drawn as text, what is derived as tables, and a checksum of each.
 
 ```
-site.json      name, floors bottom up (level, size, elevation, anchor), provenance, sha256 of every file
-F1.geojson     outline, units, walls and barriers of floor F1 in metres of its frame
+site.json      name, floors bottom up (level, size, elevation, anchor), connectors, provenance, sha256 of every file
+F1.geojson     outline, units, walls, barriers and doors of floor F1 in metres of its frame
 F1.npz         walkable mask and wall tables, derived from F1.geojson when the site was built
 ```
 A reader needs no geometry library. A file that is missing, damaged, edited or newer than this version is an
-error that names it, never a guess.
+error that names it, never a guess. Sites written before connectors and doors were known load without them.
 """
 
 from __future__ import annotations
@@ -25,6 +25,8 @@ import numpy as np
 from wayfuse.core.errors import MapError
 from wayfuse.core.frames import GeoAnchor
 from wayfuse.core.types import Array
+from wayfuse.maps.connector_entries import connector_entry, read_connector
+from wayfuse.maps.connectors import Connector
 from wayfuse.maps.site import Floor, Polygon, Site, Unit
 from wayfuse.maps.walkable import Walkable
 from wayfuse.maps.walls import WallIndex
@@ -81,6 +83,7 @@ def _write(site: Site, folder: Path) -> None:
         "name": site.name,
         "units": "metres of each floor's frame, x east, y north; anchor: (lon, lat) = origin + matrix (x, y)",
         "floors": entries,
+        "connectors": [connector_entry(connector, site.floor_names) for connector in site.connectors],
         "provenance": dict(site.provenance),
     }
     text = json.dumps(manifest, indent=1, ensure_ascii=False)
@@ -102,7 +105,12 @@ def load_site(folder: Path) -> Site:
     manifest = _manifest(folder)
     try:
         floors = tuple(_floor(folder, entry) for entry in manifest["floors"])
-        return Site(str(manifest["name"]), floors, dict(manifest.get("provenance", {})))
+        return Site(
+            name=str(manifest["name"]),
+            floors=floors,
+            provenance=dict(manifest.get("provenance", {})),
+            connectors=_connectors(folder, manifest, [floor.name for floor in floors]),
+        )
     except (KeyError, TypeError, ValueError, ArithmeticError, AttributeError) as error:
         raise MapError(f"damaged: {error!r}", where=folder / MANIFEST, remedy=ANEW) from error
 
@@ -156,7 +164,8 @@ def _geojson(floor: Floor) -> bytes:
         _feature("Polygon", _rings(u.polygon), {"kind": "unit", "name": u.name, "category": u.category}, u.id)
         for u in floor.units
     ]
-    for kind, segments in (("walls", floor.walls), ("barriers", floor.barriers)):
+    drawn = (("walls", floor.walls), ("barriers", floor.barriers), ("doors", floor.doors))
+    for kind, segments in drawn:
         features.append(_feature("MultiLineString", segments.reshape(-1, 2, 2).tolist(), {"kind": kind}))
     head = '{"type": "FeatureCollection", "coordinates": "metres, x east, y north", "features": [\n'
     lines = ",\n".join(json.dumps(feature, ensure_ascii=False) for feature in features)
@@ -216,6 +225,7 @@ def _floor(folder: Path, entry: dict[str, Any]) -> Floor:
         wall_index=walls,
         barrier_index=barriers,
         anchor=None if anchor is None else _anchor(anchor),
+        doors=segments.get("doors", np.empty((0, 4))),
     )
 
 
@@ -267,7 +277,7 @@ def _parse_geojson(
             case "unit":
                 unit = Unit(feature["id"], properties["name"], properties["category"], _polygon(coordinates))
                 units.append(unit)
-            case "walls" | "barriers" as kind:
+            case "walls" | "barriers" | "doors" as kind:
                 segments[kind] = np.array(coordinates, dtype=np.float64).reshape(-1, 4)
     return outline, tuple(units), segments
 
@@ -288,6 +298,19 @@ def _anchor_entry(anchor: GeoAnchor | None) -> dict[str, Any] | None:
 def _anchor(entry: dict[str, Any]) -> GeoAnchor:
     (lon, lat), ((a, b), (c, d)) = entry["origin"], entry["matrix"]
     return GeoAnchor((lon, lat), ((a, b), (c, d)))
+
+
+def _connectors(folder: Path, manifest: dict[str, Any], names: list[str]) -> tuple[Connector, ...]:
+    found = []
+    for entry in manifest.get("connectors", []):
+        try:
+            found.append(read_connector(entry, names))
+        except (MapError, KeyError, TypeError, ValueError, AttributeError) as error:
+            ident = entry.get("id", "?") if isinstance(entry, dict) else "?"
+            raise MapError(
+                f"damaged: connector {ident}: {error}", where=folder / MANIFEST, remedy=ANEW
+            ) from error
+    return tuple(found)
 
 
 def _sha256(content: bytes) -> str:
