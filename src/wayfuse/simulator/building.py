@@ -17,8 +17,9 @@ from wayfuse.core.errors import ConfigError
 from wayfuse.core.frames import GeoAnchor
 from wayfuse.core.types import Array, BoolArray, IntArray
 from wayfuse.simulator.geometry import clearance, crossings, inside, polygon_walls
+from wayfuse.simulator.passages import Passage
 
-__all__ = ["Building", "Room", "Storey", "shopping_centre"]
+__all__ = ["Building", "Room", "Storey", "box", "corridor_graph", "cuts", "shopping_centre"]
 
 _WIDTH, _HEIGHT = 70.0, 45.0  # m
 _STOREY_HEIGHT = 4.5  # m, slab to slab: usual for shops; the layout does not state it
@@ -70,13 +71,17 @@ class Storey:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Building:
-    """The site: storeys bottom up, its size (m), and where on the earth x = y = 0 lies (x east, y north)."""
+    """The site: storeys bottom up, its size (m), and where on the earth x = y = 0 lies (x east, y north).
+
+    ``passages`` are its stairways and lifts: none where walkers stay on their floor.
+    """
 
     name: str
     storeys: tuple[Storey, ...]
     width: float
     height: float
     anchor: GeoAnchor
+    passages: tuple[Passage, ...] = ()
 
     def floor_index(self, name: str) -> int:
         """Ordinal of the storey of a name."""
@@ -97,13 +102,13 @@ def shopping_centre(rng: np.random.Generator) -> Building:
 
 def _ground_floor(rng: np.random.Generator) -> Storey:
     rooms = _outer_rooms(rng, south_gap=(33.0, 37.0), north_gap=(20.0, 24.0))
-    cuts = _cuts(13.0, 33.0, rng)
-    rooms += [_box(a, b, 13.0, 22.5) for a, b in pairwise(cuts)]
-    rooms += [_box(a, b, 22.5, 32.0) for a, b in pairwise(cuts)]
+    inner = cuts(13.0, 33.0, rng)
+    rooms += [box(a, b, 13.0, 22.5) for a, b in pairwise(inner)]
+    rooms += [box(a, b, 22.5, 32.0) for a, b in pairwise(inner)]
     rooms += [
-        _box(45.0, 51.0, 19.5, 25.5),
-        _box(40.0, 42.5, 14.0, 16.5),
-        _box(53.0, 55.5, 28.5, 31.0),
+        box(45.0, 51.0, 19.5, 25.5),
+        box(40.0, 42.5, 14.0, 16.5),
+        box(53.0, 55.5, 28.5, 31.0),
     ]  # kiosks
     points = {
         "sw": (11.0, 11.0), "s": (35.2, 11.0), "se": (59.0, 11.0), "e": (59.0, 22.5), "ne": (59.0, 34.0),
@@ -117,9 +122,9 @@ def _ground_floor(rng: np.random.Generator) -> Storey:
 def _upper_floor(rng: np.random.Generator) -> Storey:
     rooms = _outer_rooms(rng, south_gap=None, north_gap=None)
     for low, high in ((13.0, 21.0), (24.0, 32.0)):
-        rooms += [_box(a, b, low, high) for a, b in pairwise(_cuts(13.0, 33.0, rng))]
-    rooms += [_box(37.0, 39.5, 17.0, 19.5), _box(56.0, 58.0, 25.0, 27.5)]  # kiosks
-    atrium = _box(42.0, 54.0, 16.0, 29.0)
+        rooms += [box(a, b, low, high) for a, b in pairwise(cuts(13.0, 33.0, rng))]
+    rooms += [box(37.0, 39.5, 17.0, 19.5), box(56.0, 58.0, 25.0, 27.5)]  # kiosks
+    atrium = box(42.0, 54.0, 16.0, 29.0)
     points = {
         "sw": (11.0, 11.0), "s": (35.2, 11.5), "se": (58.5, 11.5), "ne": (58.8, 33.5), "n": (35.2, 33.5),
         "nw": (11.0, 34.0), "west": (11.0, 22.5), "w": (35.2, 22.5), "gs": (47.5, 13.0), "gn": (47.5, 32.0),
@@ -133,31 +138,30 @@ def _outer_rooms(
     rng: np.random.Generator, south_gap: tuple[float, float] | None, north_gap: tuple[float, float] | None
 ) -> list[Array]:
     """The shops along the outline, depth 9 m; a gap in a row is a passage to a door."""
-    rooms = [
-        _box(a, b, 0.0, 9.0) for a, b in pairwise(_cuts(9.0, 61.0, rng, south_gap)) if (a, b) != south_gap
-    ]
+    rooms = [box(a, b, 0.0, 9.0) for a, b in pairwise(cuts(9.0, 61.0, rng, south_gap)) if (a, b) != south_gap]
     rooms += [
-        _box(a, b, 36.0, 45.0) for a, b in pairwise(_cuts(9.0, 61.0, rng, north_gap)) if (a, b) != north_gap
+        box(a, b, 36.0, 45.0) for a, b in pairwise(cuts(9.0, 61.0, rng, north_gap)) if (a, b) != north_gap
     ]
-    rooms += [_box(0.0, 9.0, a, b) for a, b in pairwise(_cuts(9.0, 36.0, rng))]
-    rooms += [_box(61.0, 70.0, a, b) for a, b in pairwise(_cuts(9.0, 36.0, rng))]
-    rooms += [_box(0.0, 9.0, 0.0, 9.0), _box(61.0, 70.0, 0.0, 9.0), _box(0.0, 9.0, 36.0, 45.0)]
+    rooms += [box(0.0, 9.0, a, b) for a, b in pairwise(cuts(9.0, 36.0, rng))]
+    rooms += [box(61.0, 70.0, a, b) for a, b in pairwise(cuts(9.0, 36.0, rng))]
+    rooms += [box(0.0, 9.0, 0.0, 9.0), box(61.0, 70.0, 0.0, 9.0), box(0.0, 9.0, 36.0, 45.0)]
     rooms.append(np.array([(61.0, 36.0), (70.0, 36.0), (70.0, 38.0), (63.0, 45.0), (61.0, 45.0)]))
     return rooms
 
 
-def _cuts(
+def cuts(
     start: float, stop: float, rng: np.random.Generator, gap: tuple[float, float] | None = None
 ) -> list[float]:
     """Cuts of a row of shops 4.5 to 8 m wide, with a gap kept as one piece where given."""
     if gap is not None:
-        return _cuts(start, gap[0], rng) + _cuts(gap[1], stop, rng)
+        return cuts(start, gap[0], rng) + cuts(gap[1], stop, rng)
     n = max(1, round((stop - start) / rng.uniform(5.0, 7.5)))
     shares = np.cumsum(rng.uniform(0.8, 1.2, n))
     return [start, *np.round(start + (stop - start) * shares[:-1] / shares[-1], 2).tolist(), stop]
 
 
-def _box(x0: float, x1: float, y0: float, y1: float) -> Array:
+def box(x0: float, x1: float, y0: float, y1: float) -> Array:
+    """Corners (4, 2) of a rectangle."""
     return np.array([(x0, y0), (x1, y0), (x1, y1), (x0, y1)])
 
 
@@ -170,7 +174,7 @@ def _storey(
     ways: str,
 ) -> Storey:
     outline = np.array([(0.0, 0.0), (_WIDTH, 0.0), (_WIDTH, 38.0), (63.0, _HEIGHT), (0.0, _HEIGHT)])
-    nodes, edges = _graph(points, [(a, b) for a, b in (way.split("-") for way in ways.split())])
+    nodes, edges = corridor_graph(points, ways)
     return Storey(
         name=name,
         elevation=elevation,
@@ -183,12 +187,15 @@ def _storey(
     )
 
 
-def _graph(points: dict[str, tuple[float, float]], ways: list[tuple[str, str]]) -> tuple[Array, IntArray]:
-    """Corridor graph with each way cut into pieces of at most the node spacing."""
+def corridor_graph(points: dict[str, tuple[float, float]], ways: str) -> tuple[Array, IntArray]:
+    """Corridor graph of named points (m) and the ways "a-b c-d" between them.
+
+    Each way is cut into pieces of at most the node spacing; the points come first, in their order.
+    """
     nodes = list(points.values())
     index = {name: i for i, name in enumerate(points)}
     edges: list[tuple[int, int]] = []
-    for a, b in ways:
+    for a, b in (way.split("-") for way in ways.split()):
         p, q = np.array(points[a]), np.array(points[b])
         pieces = int(np.ceil(np.linalg.norm(q - p) / _NODE_SPACING))
         chain = [index[a]]
