@@ -176,7 +176,11 @@ def test_throttling_leaves_few_lists(sweeps):
 def test_a_device_offset_shifts_what_it_hears(sweeps):
     _, plain = sweeps(hit_rate=1.0, softness_db=0.01, sensitivity_dbm=-300.0, weakest_dbm=-300.0)
     _, deaf = sweeps(
-        hit_rate=1.0, softness_db=0.01, sensitivity_dbm=-300.0, weakest_dbm=-300.0, device_offset_db=-7.0
+        hit_rate=1.0,
+        softness_db=0.01,
+        sensitivity_dbm=-300.0,
+        weakest_dbm=-300.0,
+        device_offset_db=(-7.0, -7.0),
     )
     for a, b in zip(plain, deaf, strict=True):
         by_network = [s.rssi[np.argsort(s.network)] for s in (a, b)]

@@ -13,14 +13,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from wayfuse.core.types import Array
+from wayfuse.core.types import Array, IntArray
 from wayfuse.simulator.fields import WaveField, smooth_field
+from wayfuse.simulator.passages import Activity
 from wayfuse.simulator.rotation import about_axis, multiply, rates, to_device
-from wayfuse.simulator.walker import GRID_HZ, Person, Walk, WalkerModel
+from wayfuse.simulator.walker import GRID_HZ, Person, Walk, WalkerModel, smooth
 
 __all__ = ["ImuModel", "ImuSamples", "MagneticField", "magnetic_field", "measure"]
 
 _GRAVITY = 9.80665  # m/s²
+_MEAN_BOUNCE = 0.85  # of `WalkerModel.bounce_share`: on stairs a springy walker is springy too
 _KNOT_S = 0.1  # s between the values of the heading error
 _DRIFT_KNOT_S = 1.0  # s between the values of slow drifts
 
@@ -33,6 +35,11 @@ class ImuModel:
     rate_sigma: float = 0.005  # relative, between phones; measured 49.5 to 50.8 Hz
     jitter_s: float = 3e-4  # of a sample's time
     harmonics: tuple[float, ...] = (1.0, 0.37, 0.13)  # vertical, at 1, 2, 3 x the step rate; measured ratios
+    stairs_accel: float = (
+        2.1  # m/s², amplitude at the step rate on stairs; stairs logs of ipin2023: 1.7 to 2.5
+    )
+    up_harmonics: tuple[float, ...] = (1.0, 0.17, 0.15)  # climbing; the same logs: 0.10 to 0.21 at 2 x
+    down_harmonics: tuple[float, ...] = (1.0, 0.35, 0.25)  # the foot lands hard: 0.14 to 0.33 at 2 x there
     forward_m: float = 0.006  # forward sway once per step: +-6 % of the speed
     lateral_m: float = 0.015  # side sway once per stride: 2 to 4 cm from side to side
     pitch_sway: float = 0.06  # rad at the step rate; measured 0.4 to 1 rad/s rms about x
@@ -72,9 +79,10 @@ class MagneticField:
     earth: Array
     disturbance: WaveField
 
-    def at(self, xy: Array, floor: int) -> Array:
-        """Field (n, 3) µT at places (n, 2) m of a floor."""
-        bent = [self.disturbance.at(np.full(len(xy), 3 * floor + k), xy) for k in range(3)]
+    def at(self, xy: Array, floor: int | IntArray) -> Array:
+        """Field (n, 3) µT at places (n, 2) m of a floor, or each of its own (n,)."""
+        first = np.broadcast_to(3 * np.asarray(floor), len(xy))
+        bent = [self.disturbance.at(first + k, xy) for k in range(3)]
         return np.asarray(self.earth + np.column_stack(bent))
 
 
@@ -104,7 +112,7 @@ def measure(
     walker: WalkerModel,
     rng: np.random.Generator,
 ) -> ImuSamples:
-    """What the phone records on a walk."""
+    """What the phone records on a walk; ``floor`` is of a walk that stays on it."""
     t = _sample_times(walk.duration, model, rng)
     knots = np.arange(0.0, walk.duration + _KNOT_S, _KNOT_S)
     phase = 2.0 * np.pi * np.interp(t, walk.phase_t, walk.phase)
@@ -126,7 +134,7 @@ def measure(
     )
 
     xy_knots = np.column_stack([np.interp(knots, walk.t, walk.xy[:, k]) for k in (0, 1)])
-    flux_knots = magnetic.at(xy_knots, floor)
+    flux_knots = magnetic.at(xy_knots, floor if walk.climb is None else _at(walk, walk.climb.floor, knots))
     flux = to_device(attitude, np.column_stack([np.interp(t, knots, b) for b in flux_knots.T]))
     flux += rng.normal(0.0, model.hard_iron_ut, 3) + rng.normal(0.0, model.field_noise_ut, (n, 3))
 
@@ -182,7 +190,30 @@ def _world_acceleration(
     c, s = np.cos(heading), np.sin(heading)
     level = np.column_stack([np.interp(t, walk.t, path[:, k]) for k in (0, 1)])
     level += np.column_stack([forward * c - aside * s, forward * s + aside * c])
-    return np.column_stack([level, swing * lift * vertical])
+    return np.column_stack([level, _vertical(walk, t, phase, swing, swing * lift * vertical, person, model)])
+
+
+def _vertical(
+    walk: Walk, t: Array, phase: Array, swing: Array, level: Array, person: Person, model: ImuModel
+) -> Array:
+    """Vertical acceleration (n,) m/s²: that of level gait, other on stairs, and that of the way up or down."""
+    if walk.climb is None:
+        return level
+    path = np.gradient(np.gradient(walk.climb.z)) * GRID_HZ**2
+    stairs = np.interp(t, walk.t, smooth((walk.climb.activity == Activity.STAIRS).astype(np.float64), 0.3))
+    down = np.interp(t, walk.t, np.gradient(walk.climb.z)) < 0.0
+    size = model.stairs_accel * swing * person.bounce / _MEAN_BOUNCE
+    tread = [
+        size * sum(a * np.cos((k + 1) * (phase - 0.9)) for k, a in enumerate(harmonics))
+        for harmonics in (model.up_harmonics, model.down_harmonics)
+    ]
+    gait = (1.0 - stairs) * level + stairs * np.where(down, tread[1], tread[0])
+    return np.asarray(gait + np.interp(t, walk.t, path))
+
+
+def _at(walk: Walk, values: IntArray, t: Array) -> IntArray:
+    """Values on the walk's grid at times t: those of the grid point before."""
+    return values[np.clip(np.searchsorted(walk.t, t, side="right") - 1, 0, len(walk.t) - 1)]
 
 
 def _rotation_vector(

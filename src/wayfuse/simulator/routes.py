@@ -13,7 +13,7 @@ import numpy as np
 from wayfuse.core.types import Array, IntArray
 from wayfuse.simulator.building import Storey
 
-__all__ = ["Route", "plan_route"]
+__all__ = ["Route", "beside", "plan_route"]
 
 _MARGIN = 0.7  # m from the walls: half a shoulder and what a rounded turn cuts off
 
@@ -45,9 +45,9 @@ def plan_route(
     visits : (e,) counts per edge, updated in place; with them the least walked edges come first (a survey).
     """
     nodes = _node_sequence(storey, length, rng, visits)
-    places = [_beside(storey, nodes[0], None, wander, rng)]
+    places = [beside(storey, nodes[0], None, wander, rng)]
     for node in nodes[1:]:
-        places.append(_beside(storey, node, places[-1], wander, rng))
+        places.append(beside(storey, node, places[-1], wander, rng))
     xy = np.array(places)
     pause = np.where(rng.random(len(xy)) < pause_share, rng.uniform(*pause_range, len(xy)), 0.0)
     pause[0] = pause[-1] = 0.0
@@ -77,9 +77,7 @@ def _node_sequence(
         node = int(edges[edge].sum() - node)
 
 
-def _beside(
-    storey: Storey, node: int, before: Array | None, wander: float, rng: np.random.Generator
-) -> Array:
+def beside(storey: Storey, node: int, before: Array | None, wander: float, rng: np.random.Generator) -> Array:
     """A place near a node that is reached from the place before without coming close to a wall."""
     centre = storey.nodes[node]
     for shrink in (1.0, 1.0, 1.0, 0.5, 0.25):

@@ -17,6 +17,8 @@ from wayfuse.simulator.walker import Walk
 
 __all__ = ["ScannerModel", "Sweep", "scan"]
 
+_NO_SHARE = 1e-9  # of a storey in what is heard: less is rounding
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ScannerModel:
@@ -40,7 +42,7 @@ class ScannerModel:
     walk_db: float = 4.0  # per walk and radio: crowds, doors, the hour; another day than the survey's
     twin_db: float = 0.7  # per reading: networks of one radio
     body_db: float = 7.0  # behind the walker's back
-    device_offset_db: float = 0.0  # of this phone's receiver
+    device_offset_db: tuple[float, float] = (0.0, 0.0)  # of this phone's receiver, at 2.4 and 5 GHz
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -54,15 +56,30 @@ class Sweep:
 
 
 def scan(
-    walk: Walk, floor: int, radios: RadioField, model: ScannerModel, rng: np.random.Generator
+    walk: Walk,
+    floor: int,
+    radios: RadioField,
+    model: ScannerModel,
+    rng: np.random.Generator,
+    loss: Array | None = None,
 ) -> tuple[Sweep, ...]:
-    """The lists a phone delivers on a walk."""
+    """The lists a phone delivers on a walk.
+
+    Parameters
+    ----------
+    floor : of a walk that stays on it; others carry theirs.
+    loss : (n, 2) dB at 2.4 and 5 GHz on the walk's grid, where something is about the phone: a lift's cabin.
+    """
     delivered = _delivery_times(walk.duration, model, rng)
     n_radios, n_sweeps = radios.n_radios, len(delivered)
     order = np.argsort(np.argsort(radios.frequency, kind="stable")) / max(1, n_radios - 1)
     heard_at = delivered[:, None] - model.latency_s - model.sweep_s * (1.0 - order)  # (sweeps, radios)
     level = _levels(walk, floor, radios, heard_at, model)
-    level += rng.normal(0.0, model.fading_db, (n_sweeps, n_radios)) + model.device_offset_db
+    if loss is not None:
+        grid = np.clip(np.searchsorted(walk.t, heard_at.ravel()), 0, len(walk.t) - 1).reshape(heard_at.shape)
+        level -= loss[grid, radios.band[None, :]]
+    offset = np.array(model.device_offset_db)[radios.band]
+    level += rng.normal(0.0, model.fading_db, (n_sweeps, n_radios)) + offset
     level += rng.normal(0.0, model.walk_db, n_radios)
 
     n = len(radios.bssid)
@@ -98,7 +115,24 @@ def _levels(walk: Walk, floor: int, radios: RadioField, heard_at: Array, model: 
     xy = np.column_stack([np.interp(flat, walk.t, walk.xy[:, k]) for k in (0, 1)])
     heading = np.interp(flat, walk.t, walk.heading)
     radio = np.tile(np.arange(shape[1]), shape[0])
-    level = radios.rssi(radio, xy, floor)
+    if walk.climb is None:
+        level = radios.rssi(radio, xy, floor)
+    else:
+        level = _between_floors(radios, radio, xy, np.interp(flat, walk.t, walk.climb.z))
     away = radios.ap_xy[radios.ap[radio]] - xy
     ahead = np.cos(np.arctan2(away[:, 1], away[:, 0]) - heading)
     return np.asarray((level - 0.5 * model.body_db * (1.0 - ahead)).reshape(shape))
+
+
+def _between_floors(radios: RadioField, radio: IntArray, xy: Array, z: Array) -> Array:
+    """RSSI (m,) dBm at heights z (m,) m: between two storeys it goes over from one's to the other's in dB."""
+    elevation = np.array([storey.elevation for storey in radios.storeys])
+    lower = np.clip(np.searchsorted(elevation, z, side="right") - 1, 0, len(elevation) - 2)
+    share = np.clip((z - elevation[lower]) / (elevation[lower + 1] - elevation[lower]), 0.0, 1.0)
+    level = np.zeros(len(z))
+    for floor in range(len(elevation)):
+        weight = np.where(lower == floor, 1.0 - share, np.where(lower + 1 == floor, share, 0.0))
+        here = weight > _NO_SHARE
+        if here.any():
+            level[here] += weight[here] * radios.rssi(radio[here], xy[here], floor)
+    return level

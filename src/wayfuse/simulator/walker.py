@@ -13,10 +13,20 @@ from itertools import pairwise
 import numpy as np
 
 from wayfuse.core.angles import wrap
-from wayfuse.core.types import Array
+from wayfuse.core.types import Array, IntArray
 from wayfuse.simulator.routes import Route
 
-__all__ = ["Person", "Walk", "WalkerModel", "draw_person", "smooth", "walk"]
+__all__ = [
+    "GRID_HZ",
+    "Climb",
+    "Person",
+    "Walk",
+    "WalkerModel",
+    "draw_person",
+    "smooth",
+    "steps_between",
+    "walk",
+]
 
 GRID_HZ = 100.0  # of the truth path
 
@@ -39,6 +49,8 @@ class WalkerModel:
     bounce_share: float = 0.85  # vertical travel as a share of an inverted pendulum's, mean over persons
     bounce_sigma: float = 0.15  # of that share, between persons
     leg_length: float = 0.9  # m
+    up_rate: float = 0.96  # of the level step rate, climbing; 1.58 to 1.76 Hz in the stairs logs of ipin2023
+    down_rate: float = 1.0  # the same, descending: 1.68 to 1.82 Hz there
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,12 +63,29 @@ class Person:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class Climb:
+    """The third dimension of a walk over floors, on the walk's grid of times.
+
+    z (n,) m above the lowest storey: of the feet, without the bounce of the gait. floor (n,) ordinal of the storey
+    nearest in height. activity (n,) `wayfuse.simulator.passages.Activity`. passage (n,) index into the building's
+    passages, -1 outside of them. stated_floor (w,) of the walk's ``stated``.
+    """
+
+    z: Array
+    floor: IntArray
+    activity: IntArray
+    passage: IntArray
+    stated_floor: IntArray
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class Walk:
     """Truth of one walk, times in s from its start.
 
     t (n,), xy (n, 2) m, heading (n,) rad (unwrapped: of the body, which goes on while standing), gait (n,) 0
     standing to 1 walking. contact (k,) s, step_length (k,) m. phase_t, phase: knots of the gait phase, whole
-    at a contact. stated: (w, 3) t, x, y where the surveyor stands or turns. duration: s.
+    at a contact. stated: (w, 3) t, x, y where the surveyor stands or turns. duration: s. climb: None for a walk on
+    one floor.
     """
 
     t: Array
@@ -68,6 +97,7 @@ class Walk:
     phase_t: Array
     phase: Array
     stated: Array
+    climb: Climb | None = None
 
     @property
     def duration(self) -> float:
@@ -98,7 +128,7 @@ def walk(route: Route, person: Person, model: WalkerModel, rng: np.random.Genera
     for a, b in pairwise(ends):
         first = len(knots)
         knots.append((t, arc, float(len(contacts))))
-        for duration, length in _steps(vertex, direction, a, b, person, model, rng):
+        for duration, length in steps_between(vertex, direction, a, b, person, model, rng):
             t, arc = t + duration, arc + length
             contacts.append((t, length))
             knots.append((t, arc, float(len(contacts))))
@@ -112,7 +142,7 @@ def walk(route: Route, person: Person, model: WalkerModel, rng: np.random.Genera
     return _path(route, vertex, direction, np.array(knots), np.array(contacts), bouts, stated, t, model)
 
 
-def _steps(
+def steps_between(
     vertex: Array,
     direction: Array,
     first: int,

@@ -1,0 +1,219 @@
+"""Journeys over floors: level ways between the connectors of a building, and the ways through them.
+
+A visitor comes from somewhere on a floor, wanders, takes stairs or lift to another floor, and so on. The surveyor
+of a journey states a place at every turn, at both landings of a connector, on a half landing (first with the floor
+left, then with the floor ahead), and in a lift's cabin on entering and when it has stopped.
+"""
+
+from __future__ import annotations
+
+import heapq
+from dataclasses import dataclass
+
+import numpy as np
+
+from wayfuse.core.types import Array
+from wayfuse.simulator.building import Building, Storey
+from wayfuse.simulator.passages import Activity, Passage, Stretch
+from wayfuse.simulator.rides import LiftModel
+from wayfuse.simulator.routes import beside
+from wayfuse.simulator.travel import Leg
+
+__all__ = ["Journey", "Trip", "draw_trips", "plan_journey"]
+
+_NEAR = 0.5  # m, a node this near to a landing is the landing's
+_WAY = (14.0, 34.0)  # m a visitor goes on a floor
+
+
+@dataclass(frozen=True, slots=True)
+class Trip:
+    """A change of floors: through which passage (index), to which floor."""
+
+    passage: int
+    floor: int
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Journey:
+    """Where a journey starts (x, y m, floor) and its legs."""
+
+    start: tuple[float, float, int]
+    legs: tuple[Leg, ...]
+
+
+def draw_trips(
+    building: Building, n: int, rng: np.random.Generator, *, lift_first: bool = False
+) -> tuple[int, list[Trip]]:
+    """A start floor and ``n`` changes of floors, by lift and by stairs in turn."""
+    floor = start = int(rng.integers(len(building.storeys)))
+    trips: list[Trip] = []
+    for k in range(n):
+        by_lift = (k % 2 == 0) == lift_first
+        choices = [
+            Trip(index, other)
+            for index, passage in enumerate(building.passages)
+            if passage.is_lift == by_lift and floor in passage.connector.floors
+            for other in passage.connector.floors
+            if other != floor and (by_lift or _adjacent(passage, floor, other))
+        ]
+        trips.append(choices[int(rng.integers(len(choices)))])
+        floor = trips[-1].floor
+    return start, trips
+
+
+def _adjacent(passage: Passage, a: int, b: int) -> bool:
+    floors = passage.connector.floors
+    return abs(floors.index(a) - floors.index(b)) == 1
+
+
+def plan_journey(
+    building: Building,
+    start: int,
+    trips: list[Trip],
+    rng: np.random.Generator,
+    *,
+    lifts: LiftModel,
+    wander: float = 0.6,
+    pause_share: float = 0.15,
+    pause_range: tuple[float, float] = (2.0, 5.0),
+) -> Journey:
+    """A journey from a place on floor ``start`` through the trips, and on to a place on the last floor.
+
+    Parameters
+    ----------
+    wander : how far beside a node one passes, m (largest, per axis).
+    pause_share, pause_range : share of inner way-points at which one stands, and for how long (s).
+    """
+    storey = building.storeys[start]
+    node = int(rng.choice(_inner(building, start)))
+    place = beside(storey, node, None, wander, rng)
+    origin = (float(place[0]), float(place[1]), start)
+    legs: list[Leg] = []
+    floor = start
+    for trip in [*trips, None]:
+        passage = None if trip is None else building.passages[trip.passage]
+        ways = _wander(
+            building, floor, node, None if passage is None else _landing_node(building, floor, passage), rng
+        )
+        legs += _level_legs(building.storeys[floor], floor, ways, place, wander, passage is not None, rng)
+        _pause(legs, len(ways) - 1, pause_share, pause_range, rng)
+        if trip is None or passage is None:
+            break
+        legs += _through(passage, trip, floor, legs, lifts, rng)
+        floor = trip.floor
+        node = _landing_node(building, floor, passage)
+        place = np.array(legs[-1].stretch[:2])
+    return Journey(origin, tuple(legs))
+
+
+def _landing_node(building: Building, floor: int, passage: Passage) -> int:
+    landing = passage.connector.landing(floor)
+    if landing is None:
+        raise ValueError(f"{passage.connector.id} does not stop on floor {floor}")
+    return int(np.argmin(np.hypot(*(building.storeys[floor].nodes - (landing.x, landing.y)).T)))
+
+
+def _inner(building: Building, floor: int) -> list[int]:
+    """Nodes of a floor that are no landings."""
+    nodes = building.storeys[floor].nodes
+    landings = [p.connector.landing(floor) for p in building.passages]
+    taken = [
+        int(i)
+        for landing in landings
+        if landing is not None
+        for i in np.flatnonzero(np.hypot(*(nodes - (landing.x, landing.y)).T) < _NEAR)
+    ]
+    return [i for i in range(len(nodes)) if i not in taken]
+
+
+def _wander(
+    building: Building, floor: int, node: int, goal: int | None, rng: np.random.Generator
+) -> list[int]:
+    """Nodes to pass after ``node``: to a place of interest, then to the goal (the place is the goal where None)."""
+    storey, inner = building.storeys[floor], _inner(building, floor)
+    best: list[int] = []
+    for _ in range(24):
+        middle = int(rng.choice(inner))
+        first = _shortest(storey, node, middle)
+        second = [] if goal is None else _shortest(storey, middle, goal)
+        best = [*first, *second]
+        turns_back = bool(first and second) and second[0] == [node, *first][-2]
+        if _WAY[0] <= _length(storey, [node, *best]) <= _WAY[1] and not turns_back:
+            break
+    return best or [int(rng.choice(_neighbours(storey, node)))]
+
+
+def _neighbours(storey: Storey, node: int) -> list[int]:
+    return [int(e.sum() - node) for e in storey.edges if node in e]
+
+
+def _length(storey: Storey, nodes: list[int]) -> float:
+    return float(np.hypot(*np.diff(storey.nodes[nodes], axis=0).T).sum())
+
+
+def _shortest(storey: Storey, start: int, goal: int) -> list[int]:
+    """Nodes of the shortest way, the start left out."""
+    queue: list[tuple[float, int, int]] = [(0.0, start, -1)]
+    came: dict[int, int] = {}
+    while queue:
+        far, node, before = heapq.heappop(queue)
+        if node in came:
+            continue
+        came[node] = before
+        if node == goal:
+            break
+        for other in _neighbours(storey, node):
+            if other not in came:
+                gap = float(np.hypot(*(storey.nodes[other] - storey.nodes[node])))
+                heapq.heappush(queue, (far + gap, other, node))
+    way = [goal]
+    while came[way[-1]] >= 0:
+        way.append(came[way[-1]])
+    return way[-2::-1]
+
+
+def _level_legs(
+    storey: Storey,
+    floor: int,
+    nodes: list[int],
+    place: Array,
+    wander: float,
+    to_landing: bool,
+    rng: np.random.Generator,
+) -> list[Leg]:
+    legs = []
+    for i, node in enumerate(nodes):
+        exact = to_landing and i == len(nodes) - 1
+        place = storey.nodes[node] if exact else beside(storey, node, place, wander, rng)
+        legs.append(Leg(Stretch(float(place[0]), float(place[1]), Activity.WALKING), stated=floor))
+    return legs
+
+
+def _pause(
+    legs: list[Leg], n: int, share: float, span: tuple[float, float], rng: np.random.Generator
+) -> None:
+    """Stand at some of the last legs' ends but the very last."""
+    for k in range(max(len(legs) - n - 1, 0), len(legs) - 1):
+        if legs[k].passage < 0 and rng.random() < share:
+            legs[k] = legs[k]._replace(pause=float(rng.uniform(*span)), left=legs[k].stated)
+
+
+def _through(
+    passage: Passage, trip: Trip, floor: int, legs: list[Leg], lifts: LiftModel, rng: np.random.Generator
+) -> list[Leg]:
+    """Legs from landing to landing."""
+    way = passage.way(floor, trip.floor)
+    inside = [Leg(piece, passage=trip.passage) for piece in way]
+    if passage.is_lift:
+        if legs:  # stand before the door until the lift comes
+            legs[-1] = legs[-1]._replace(pause=float(rng.uniform(*lifts.wait_s)), left=floor)
+        enter, move = (float(rng.uniform(*lifts.doors_s)) for _ in range(2))
+        inside[0] = inside[0]._replace(pause=enter, stated=floor)
+        inside[1] = inside[1]._replace(pause=move, stated=trip.floor)
+    else:
+        flights = [k for k, piece in enumerate(way) if piece.activity is Activity.STAIRS]
+        for k in range(flights[0], flights[-1]):  # on half landings: arriving, and before the next flight
+            stated = floor if 2 * k < flights[0] + flights[-1] else trip.floor
+            inside[k] = inside[k]._replace(stated=stated)
+    inside[-1] = inside[-1]._replace(stated=trip.floor)
+    return inside
