@@ -22,7 +22,7 @@ _PHONE_HEIGHT = 1.2  # m above the feet
 class BarometerModel:
     """Sensor and air. "measured" marks figures of the public ipin2023 logs."""
 
-    rate_hz: float = 10.0  # measured
+    rate_hz: float = 10.0  # measured; 0: the phone has none
     noise_m: float = 0.04  # per sample; measured
     drift_m_per_min: float = 0.1  # weather, standard deviation of its slope; measured median 0.1
     draughts_per_min: float = 0.5  # doors, fans
@@ -56,8 +56,9 @@ def measure_pressure(
     z = np.zeros(len(walk.t)) if walk.climb is None else walk.climb.z
     slope = model.drift_m_per_min / 60.0 * rng.normal()
     air = _PHONE_HEIGHT + slope * walk.t + _draughts(walk.t, model, rng)
-    t = np.arange(rng.uniform(0.0, 1.0 / model.rate_hz), walk.duration, 1.0 / model.rate_hz)
-    t = np.round(t, 3)
+    if not model.rate_hz:
+        return PressureSamples(np.empty(0), np.empty(0))
+    t = np.round(np.arange(rng.uniform(0.0, 1.0 / model.rate_hz), walk.duration, 1.0 / model.rate_hz), 3)
     height = np.interp(t, walk.t, _lagged(z + air, model.lag_s)) + rng.normal(0.0, model.noise_m, len(t))
     ground = model.sea_hpa + model.weather_hpa * rng.normal() + phone_hpa
     hpa = ground * np.exp(-height / _SCALE_HEIGHT)

@@ -54,7 +54,7 @@ def write_demo(folder: Path, seed: int, scenario: Scenario | None = None) -> Dem
         folder / "survey", "survey", site, scenario, survey_seed, scenario.survey_walks, truth, visits
     )
     walks = _write_walks(
-        folder / "walks", "walk", site, scenario, test_seed, scenario.test_walks, truth, None
+        folder / "walks", "walk", site, scenario.tracked(), test_seed, scenario.test_walks, truth, None
     )
     return DemoFiles(folder / "site", survey, walks, truth)
 

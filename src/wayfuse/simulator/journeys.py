@@ -12,14 +12,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from wayfuse.core.types import Array
+from wayfuse.core.types import Array, IntArray
 from wayfuse.simulator.building import Building, Storey
 from wayfuse.simulator.passages import Activity, Passage, Stretch
 from wayfuse.simulator.rides import LiftModel
-from wayfuse.simulator.routes import beside
+from wayfuse.simulator.routes import beside, plan_route
 from wayfuse.simulator.travel import Leg
 
-__all__ = ["Journey", "Trip", "draw_trips", "plan_journey"]
+__all__ = ["Journey", "Trip", "draw_trips", "plan_journey", "stay"]
 
 _NEAR = 0.5  # m, a node this near to a landing is the landing's
 _WAY = (14.0, 34.0)  # m a visitor goes on a floor
@@ -217,3 +217,32 @@ def _through(
             inside[k] = inside[k]._replace(stated=stated)
     inside[-1] = inside[-1]._replace(stated=trip.floor)
     return inside
+
+
+def stay(
+    building: Building,
+    floor: int,
+    length: float,
+    rng: np.random.Generator,
+    *,
+    wander: float = 0.6,
+    pause_share: float = 0.15,
+    pause_range: tuple[float, float] = (2.0, 5.0),
+    visits: IntArray | None = None,
+) -> Journey:
+    """A walk of about ``length`` m on one floor; parameters as of `wayfuse.simulator.routes.plan_route`."""
+    route = plan_route(
+        building.storeys[floor],
+        length,
+        rng,
+        wander=wander,
+        pause_share=pause_share,
+        pause_range=pause_range,
+        visits=visits,
+    )
+    places, pauses = route.xy.tolist(), route.pause.tolist()
+    legs = tuple(
+        Leg(Stretch(x, y, Activity.WALKING), pause, stated=floor, left=floor if pause else -1)
+        for (x, y), pause in zip(places[1:], pauses[1:], strict=True)
+    )
+    return Journey((places[0][0], places[0][1], floor), legs)

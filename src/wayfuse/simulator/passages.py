@@ -76,9 +76,14 @@ class Passage:
 
     def walls(self, floor: int) -> Array:
         """Edges (w, 4) m of the footprint on a floor it serves, but for the open one."""
-        p, q = self.footprint, np.roll(self.footprint, -1, axis=0)
-        edges = np.hstack([p, q])
-        return np.delete(edges, self.open_edges[self.connector.floors.index(floor)], axis=0)
+        return np.delete(self._edges(), self.open_edges[self.connector.floors.index(floor)], axis=0)
+
+    def opening(self, floor: int) -> Array:
+        """The open edge (4,) m on a floor it serves."""
+        return np.asarray(self._edges()[self.open_edges[self.connector.floors.index(floor)]])
+
+    def _edges(self) -> Array:
+        return np.hstack([self.footprint, np.roll(self.footprint, -1, axis=0)])
 
 
 def stairway(

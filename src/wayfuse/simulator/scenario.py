@@ -17,9 +17,13 @@ from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any, TypeVar
 
+import numpy as np
+
 from wayfuse.core.errors import ConfigError
+from wayfuse.simulator.barometer import BarometerModel
 from wayfuse.simulator.imu import ImuModel
 from wayfuse.simulator.radio_field import RadioModel
+from wayfuse.simulator.rides import LiftModel
 from wayfuse.simulator.scanner import ScannerModel
 from wayfuse.simulator.walker import WalkerModel
 
@@ -40,20 +44,36 @@ class Scenario:
     pause_share: float = 0.12  # of inner way-points at which they stand
     pause_s: tuple[float, float] = (2.0, 5.0)
     stated_sigma: float = 0.1  # m, how well a surveyor states where he is
+    changes: int = 2  # of floors on a walk to track, where there are stairs or lifts
+    tracked_offset_db: tuple[float, float] = (
+        0.0,
+        0.0,
+    )  # of the phone tracked against the survey's; 2.4, 5 GHz
     walker: WalkerModel = field(default_factory=WalkerModel)
     imu: ImuModel = field(default_factory=ImuModel)
     radio: RadioModel = field(default_factory=RadioModel)
     scanner: ScannerModel = field(default_factory=ScannerModel)
+    barometer: BarometerModel = field(default_factory=BarometerModel)
+    lift: LiftModel = field(default_factory=LiftModel)
 
     def __post_init__(self) -> None:
         if not 0.0 < self.duration_s[0] <= self.duration_s[1]:
             raise ConfigError(
                 f"duration_s: {self.duration_s}", remedy="shortest and longest walk in s, positive"
             )
-        if self.survey_walks < 0 or self.test_walks < 0:
-            raise ConfigError("survey_walks and test_walks must not be negative")
+        if self.survey_walks < 0 or self.test_walks < 0 or self.changes < 0:
+            raise ConfigError("survey_walks, test_walks and changes must not be negative")
         if self.scanner.period_s <= 0.0 or self.imu.rate_hz <= 0.0:
             raise ConfigError("scanner.period_s and imu.rate_hz must be positive")
+        if self.barometer.rate_hz < 0.0:
+            raise ConfigError("barometer.rate_hz must not be negative", remedy="0 is a phone without one")
+        if min(self.lift.speed, self.lift.acceleration[0], self.lift.jerk) <= 0.0:
+            raise ConfigError("lift.speed, lift.acceleration and lift.jerk must be positive")
+
+    def tracked(self) -> Scenario:
+        """The scenario of the walks to track: their phone hears ``tracked_offset_db`` more than the survey's."""
+        low, high = np.add(self.scanner.device_offset_db, self.tracked_offset_db).tolist()
+        return replace(self, scanner=replace(self.scanner, device_offset_db=(low, high)))
 
 
 T = TypeVar("T")

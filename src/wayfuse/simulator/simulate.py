@@ -22,7 +22,7 @@ from wayfuse.simulator.scanner import Sweep, scan
 from wayfuse.simulator.scenario import Scenario
 from wayfuse.simulator.walker import Walk, draw_person, walk
 
-__all__ = ["SimulatedSite", "Truth", "make_site", "simulate_walk"]
+__all__ = ["SimulatedSite", "Truth", "make_site", "simulate_walk", "site_in"]
 
 EPOCH_MS = 1_577_872_800_000  # 1 January 2020, 10:00 UTC: the first walk's start unless told otherwise
 DECIMALS = {
@@ -67,8 +67,12 @@ class Truth:
 
 
 def make_site(scenario: Scenario, rng: np.random.Generator) -> SimulatedSite:
-    """Draw a site."""
-    building = shopping_centre(rng)
+    """Draw a shopping centre."""
+    return site_in(shopping_centre(rng), scenario, rng)
+
+
+def site_in(building: Building, scenario: Scenario, rng: np.random.Generator) -> SimulatedSite:
+    """Draw the access points and the magnetic field of a building."""
     return SimulatedSite(
         building=building,
         radios=radio_field(building, scenario.radio, rng),
