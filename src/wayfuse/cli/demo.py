@@ -37,7 +37,9 @@ _PARTS = (_DATA, _SITE, _MAP, _ESTIMATES, f"{_ESTIMATES}.json", _PICTURES, _REPO
 @click.option("--out", required=True, type=click.Path(path_type=Path), help="Folder for all files.")
 @click.option("--seed", type=int, default=0, show_default=True, help="Another seed, another building.")
 def demo(out: Path, seed: int) -> None:
-    """Simulate a building and its walkers, then import, survey, track, evaluate and draw.
+    """Simulate a building of three floors and its walkers, then import, survey, track, evaluate and draw.
+
+    The walkers change floors by stairs and lift. The plans are an IMDF archive, the recordings GetSensorData logs.
 
     An earlier demo in --out is replaced; a folder that holds anything else is refused.
     """
@@ -63,9 +65,9 @@ def run_demo(
         if quiet:
             stack.enter_context(contextlib.redirect_stdout(io.StringIO()))
             stack.enter_context(contextlib.redirect_stderr(io.StringIO()))
-        _simulate(folder, seed, scenario)
+        plan = _simulate(folder, seed, scenario)
         _say("Import the floor plans.")
-        _run("site", "import", "ms-indoor", folder / _DATA / "site", "--out", folder / _SITE)
+        _run("site", "import", "imdf", plan, "--out", folder / _SITE)
         if pictures:
             _say("Draw the floors.")
             _run("site", "show", folder / _SITE, "--out", folder / _PICTURES / "site")
@@ -98,15 +100,18 @@ def _claim(folder: Path) -> None:
         raise UsageError(f"cannot write: {error.strerror}", where=folder, remedy=remedy) from error
 
 
-def _simulate(folder: Path, seed: int, scenario: Scenario | None) -> None:
-    from wayfuse.simulator.demo import write_demo
+def _simulate(folder: Path, seed: int, scenario: Scenario | None) -> Path:
+    """Write the data; the floor plans."""
+    from wayfuse.simulator.house_demo import write_house_demo
 
-    files = write_demo(folder / _DATA, seed, scenario)
-    floors = ", ".join(sorted(p.name for p in files.site.iterdir() if p.is_dir()))
+    made = write_house_demo(folder / _DATA, seed, scenario)
+    building = made.site.building
+    ways = ", ".join(passage.connector.name for passage in building.passages)
     click.echo(
-        f"Simulated a building (floors {floors}), {len(files.survey)} survey walks and {len(files.walks)} walks to"
-        f" track, seed {seed}: {folder / _DATA}"
+        f"Simulated a building of {len(building.storeys)} floors ({ways}), {len(made.survey)} survey walks and"
+        f" {len(made.walks)} walks to track, seed {seed}: {folder / _DATA}"
     )
+    return made.plan
 
 
 def _track(folder: Path, seed: int) -> None:
