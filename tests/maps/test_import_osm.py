@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import json
-
 import numpy as np
 import pytest
 
 from wayfuse.core.errors import MapError
 from wayfuse.core.frames import GeoAnchor
 from wayfuse.maps.importers.osm import import_site, parse_levels
+from wayfuse.maps.problems import noted_problems
 from wayfuse.maps.site import Site
 
 ANCHOR = GeoAnchor.from_origin(13.0, 51.0)
@@ -138,16 +137,21 @@ def test_connectors_are_units_of_the_levels_they_serve(tmp_path):
     kinds = [
         sorted(u.category for u in f.units if u.category not in ("room", "corridor")) for f in site.floors
     ]
-    assert kinds == [["elevator", "escalator", "stairs", "stairs"], ["elevator", "stairs", "stairs"]]
-    steps = next(u for u in site.floors[0].units if u.category == "stairs" and u.polygon.area > 5)
-    assert steps.polygon.area == pytest.approx(12.0, abs=0.05)
-    served = json.loads(site.provenance["connectors"])
-    assert sorted((s["category"], tuple(s["levels"])) for s in served.values()) == [
-        ("elevator", (0, 1)),
-        ("escalator", (0,)),
-        ("stairs", (0, 1)),
-        ("stairs", (0, 1)),
+    assert site.floor_names == ("-1", "0", "1")  # people get to -1 by lift, and away again
+    assert kinds == [
+        ["elevator"],
+        ["elevator", "escalator", "stairs", "stairs"],
+        ["elevator", "stairs", "stairs"],
     ]
+    steps = next(u for u in site.floors[1].units if u.category == "stairs" and u.polygon.area > 5)
+    assert steps.polygon.area == pytest.approx(12.0, abs=0.05)
+    assert sorted((c.kind, c.floors) for c in site.connectors) == [
+        ("lift", (0, 1, 2)),
+        ("stairs", (1, 2)),
+        ("stairs", (1, 2)),
+    ]
+    (problem,) = noted_problems(site)  # the escalator to half a level
+    assert problem.kind == "connector-to-nowhere"
     site.save(tmp_path / "SITE")
     assert Site.load(tmp_path / "SITE").provenance == site.provenance
 
@@ -237,13 +241,20 @@ def osm_folder(data_root):
 @pytest.mark.real_data
 def test_a_real_university_building(osm_folder):
     site, report = import_site(osm_folder / "APBorig.osm")
-    assert site.floor_names == ("0", "1", "2", "3")
-    assert [len(floor.units) for floor in site.floors] == [90, 124, 128, 131]
+    assert site.floor_names == ("-1", "0", "1", "2", "3")
+    assert [len(floor.units) for floor in site.floors] == [3, 90, 124, 128, 131]
     assert max(note.residual for note in report.floors) < 0.005
-    assert sum(len(note.warnings) for note in report.floors) == 1  # one room of 400 without a door
-    served = json.loads(site.provenance["connectors"]).values()
-    assert [0, 1, 2, 3] in [s["levels"] for s in served if s["category"] == "elevator"]
-    for floor in site.floors:
+    assert (
+        sum(len(note.warnings) for note in report.floors) == 4
+    )  # a room of 400 without door, 3 doors of nothing
+    served = sorted((c.kind.value, c.floors) for c in site.connectors)
+    assert (
+        served
+        == [("lift", (1, 2, 3, 4))] * 2 + [("stairs", (0, 1, 2, 3, 4))] * 3 + [("stairs", (1, 2, 3, 4))] * 4
+    )
+    for c in site.connectors:
+        assert all(site.floors[at.floor].walkable.contains([at.x], [at.y])[0] for at in c.landings)
+    for floor in site.floors[1:]:
         assert floor.walkable_share > 0.99
         assert len(reached(floor)) > 0.95 * np.count_nonzero(floor.walkable.mask)
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import xml.etree.ElementTree as ET
 
 import numpy as np
@@ -11,6 +10,7 @@ import shapely
 
 from wayfuse.core.errors import MapError
 from wayfuse.maps.importers.simpleloc import import_site
+from wayfuse.maps.problems import noted_problems
 from wayfuse.maps.site import Site
 
 
@@ -74,10 +74,13 @@ def test_cut_outs_stairs_and_lifts(tmp_path):
     assert low.units[0].polygon.area == pytest.approx(16.0, abs=0.1)
     lift = low.units[1].polygon.exterior
     np.testing.assert_allclose((lift.min(axis=0), lift.max(axis=0)), ((3.5, 7.0), (4.5, 9.0)), atol=1e-3)
-    assert json.loads(site.provenance["connectors"]) == {
-        "stairs 1/0": {"category": "stairs", "levels": [1, 2]},
-        "elevator 1/0": {"category": "elevator", "levels": [1]},
-    }
+    (stairs,) = site.connectors
+    assert (stairs.id, stairs.kind, stairs.floors) == ("stairs 1/0", "stairs", (0, 1))
+    assert all(
+        f.walkable.contains([at.x], [at.y])[0] for f, at in zip(site.floors, stairs.landings, strict=True)
+    )
+    (problem,) = noted_problems(site)
+    assert (problem.kind, problem.feature) == ("connector-to-nowhere", "elevator 1/0")
     assert low.walkable.contains([16.0], [4.0]).tolist() == [True]
     assert report.floors[0].warnings == ()
     bare = import_site(write(tmp_path / "bare.xml", floor()))[0].floors[0]
@@ -154,8 +157,16 @@ def test_the_real_building_holds_its_ground_truth(data_root):
     site, report = import_site(path)
     assert (site.name, site.floor_names) == ("simpleloc_ipin2024", ("2. Stock", "3. Stock"))
     assert all(note.warnings == () for note in report.floors)  # every door lies on its wall
-    served = json.loads(site.provenance["connectors"]).values()
-    assert [s["levels"] for s in served if s["category"] == "stairs"] == [[2, 3]] * 5
+    assert [(c.kind, c.floors) for c in site.connectors] == [("stairs", (0, 1))] * 5
+    apart = [np.hypot(a.x - b.x, a.y - b.y) for a, b in (c.landings for c in site.connectors)]
+    assert sorted(round(d, 1) for d in apart) == [
+        1.6,
+        1.6,
+        1.7,
+        6.7,
+        7.7,
+    ]  # where each flight starts and ends
+    assert [len(floor.doors) for floor in site.floors] == [53, 63]
     for node in ET.parse(path).getroot().iter("floor"):  # noqa: S314 - a file of the data set
         found = site.floors[site.floor_index(node.get("name"))]
         assert found.elevation == pytest.approx(float(node.get("atHeight")))

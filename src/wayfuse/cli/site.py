@@ -15,6 +15,7 @@ __all__ = ["site"]
 
 # name of a building format -> module of its importer: import_site(path) -> (site, report)
 IMPORTERS = {
+    "ipin2023": "wayfuse.maps.importers.ipin2023",
     "ms-indoor": "wayfuse.maps.importers.ms_indoor",
     "hcu": "wayfuse.maps.importers.hcu",
     "image": "wayfuse.maps.importers.image",
@@ -47,6 +48,8 @@ def import_command(plan_format: str, path: Path, out: Path, overwrite: bool, as_
     control points, and traced walls.
 
     FORMAT imdf: PATH is a ZIP archive of the Indoor Mapping Data Format 1.0.0.
+
+    FORMAT ipin2023: PATH is the folder of GetSensorData logs of IPIN 2023 Track 3.
 
     FORMAT osm: PATH is a building of OpenStreetMap with Simple Indoor Tagging, .osm or .geojson.
 

@@ -4,6 +4,10 @@
 areas; rooms, corridors, doors and stairs fill the space between them and are walked in. The frame is UTM less the
 south-west corner of the building (`provenance.origin`), so that waypoints of the set, which are UTM too, need only a
 shift. UTM metres are up to 0.04 % short of true ones.
+
+Stairs and lifts are drawn floor by floor and joined where they overlap (`joining`). A lift shaft is plumb: an area of
+another floor with the outline of a lift is that lift, whatever its `Type` (the lift to the 4th floor is drawn as a
+room on the floors below).
 """
 
 from __future__ import annotations
@@ -20,11 +24,14 @@ from wayfuse.core.errors import MapError
 from wayfuse.core.frames import GeoAnchor
 from wayfuse.core.types import Array
 from wayfuse.maps.build import build_floor, nominal_elevation
+from wayfuse.maps.connectors import ConnectorKind
 from wayfuse.maps.geometry import edges, free_space, from_shapely
+from wayfuse.maps.importers.joining import KINDS, Piece, join_pieces
 from wayfuse.maps.importers.plan_file import parse_json, read_limited
-from wayfuse.maps.importers.report import FloorReport, ImportReport
-from wayfuse.maps.importers.rooms import cleaned, outline_of
+from wayfuse.maps.importers.report import FloorReport, ImportReport, Notes
+from wayfuse.maps.importers.rooms import cleaned, outline_of, to_shapely
 from wayfuse.maps.importers.utm import utm_to_lonlat
+from wayfuse.maps.problems import KEY, problems_text
 from wayfuse.maps.site import Floor, Polygon, Site, Unit
 from wayfuse.maps.walls import LARGEST
 
@@ -52,6 +59,7 @@ CATEGORIES = {
 }  # of the types in the files, letters only
 CLOSED = ("wall", "furniture", "void")  # nobody walks in these
 UNNAMED = ("wall", "door")  # drawn as walls and the gaps between them, not as units
+PLUMB = 0.9  # of the union of two areas they must share to be the same shaft
 SEAM = 0.05  # m, neighbouring areas may be drawn this far apart
 _CRS = re.compile(r"EPSG:+32([67])(\d\d)$")
 
@@ -64,7 +72,7 @@ class _Plan:
     level: int
     zone: tuple[int, bool]
     areas: list[tuple[str, str, list[Array]]] = field(default_factory=list)
-    warnings: list[str] = field(default_factory=list)
+    notes: Notes = field(default_factory=Notes)
 
 
 def level_of(name: str) -> int | None:
@@ -115,15 +123,40 @@ def import_site(folder: Path) -> tuple[Site, ImportReport]:
         _floor(plan, corner, size, anchor, nominal_elevation(plan.level, has_ground=has_ground))
         for plan in plans
     ]
+    notes = Notes()
+    connectors = join_pieces(floors, _pieces(floors), notes)
+    problems = [problem for plan in plans for problem in plan.notes.problems] + notes.problems
     provenance = {
         "importer": "hcu",
         "source": ", ".join(plan.path.name for plan in plans),
         "frame": f"UTM zone {zone}{'S' if south else 'N'} less origin, m",
         "origin": f"{corner[0]:.3f} {corner[1]:.3f}",
+        KEY: problems_text(problems),
     }
-    site = Site(folder.resolve().name, tuple(floors), provenance)
-    reports = [FloorReport(f.name, residual, tuple(p.warnings)) for f, p in zip(floors, plans, strict=True)]
-    return site, ImportReport(tuple(reports))
+    site = Site(folder.resolve().name, tuple(floors), provenance, connectors)
+    reports = [FloorReport(f.name, residual, tuple(p.notes)) for f, p in zip(floors, plans, strict=True)]
+    return site, ImportReport(tuple(reports), tuple(notes))
+
+
+def _pieces(floors: list[Floor]) -> list[Piece]:
+    """Stairs and lifts of all floors, and the areas of other floors that a lift shaft passes through."""
+    shapes = [[(unit, to_shapely([unit.polygon])) for unit in floor.units] for floor in floors]
+    found = [
+        Piece(f"{floors[k].name}/{unit.id}", KINDS[unit.category], shape, (k,))
+        for k, drawn in enumerate(shapes)
+        for unit, shape in drawn
+        if unit.category in KINDS
+    ]
+    lifts = [piece for piece in found if piece.kind is ConnectorKind.LIFT]
+    for k, drawn in enumerate(shapes):
+        for unit, shape in drawn:
+            if unit.category not in KINDS and any(_is_same(shape, lift.shape) for lift in lifts):
+                found.append(Piece(f"{floors[k].name}/{unit.id}", ConnectorKind.LIFT, shape, (k,)))
+    return found
+
+
+def _is_same(a: Any, b: Any) -> bool:
+    return bool(a.intersects(b) and a.intersection(b).area > PLUMB * a.union(b).area)
 
 
 def _read(path: Path) -> _Plan:
@@ -135,7 +168,7 @@ def _read(path: Path) -> _Plan:
     features = document.get("features") if isinstance(document, dict) else None
     if not isinstance(features, list):
         raise MapError("is not a FeatureCollection", where=path, remedy="fetch the data anew")
-    plan = _Plan(path, level, _zone(path, document))
+    plan = _Plan(path, level, _zone(path, document), notes=Notes(name))
     skipped: Counter[str] = Counter()
     for number, feature in enumerate(features):
         kind = _type(feature)
@@ -145,7 +178,7 @@ def _read(path: Path) -> _Plan:
             skipped["no polygon" if not drawn else f"type {kind or 'missing'}"] += 1
             continue
         plan.areas += [(str(number), category, rings) for rings in drawn]
-    plan.warnings += [f"{count} areas left out: {why}" for why, count in sorted(skipped.items())]
+    plan.notes += [f"{count} areas left out: {why}" for why, count in sorted(skipped.items())]
     if not plan.areas:
         raise MapError("holds no area of a known Type", where=path, remedy="fetch the data anew")
     return plan
@@ -188,13 +221,14 @@ def _floor(plan: _Plan, corner: Array, size: Array, anchor: GeoAnchor, elevation
     units: list[Unit] = []
     closed: list[Polygon] = []
     drawn: list[Polygon] = []
+    doors: list[Array] = []
     for ident, category, rings in plan.areas:
-        for polygon in cleaned(
-            [ring - corner for ring in rings], f"area {ident} ({category})", plan.warnings
-        ):
+        for polygon in cleaned([ring - corner for ring in rings], f"area {ident} ({category})", plan.notes):
             drawn.append(polygon)
             if category in CLOSED:
                 closed.append(polygon)
+            if category == "door":
+                doors.append(_across(polygon))
             if category not in UNNAMED:
                 units.append(Unit(ident, "", category, polygon))
     outline = outline_of(drawn, SEAM)
@@ -203,7 +237,7 @@ def _floor(plan: _Plan, corner: Array, size: Array, anchor: GeoAnchor, elevation
     free = free_space(outline, closed, widening=0.0)
     apart = sorted(part.area for part in from_shapely(free))[:-1]
     if apart:
-        plan.warnings.append(f"{len(apart)} parts ({sum(apart):.0f} m2) have no door to the largest")
+        plan.notes.append(f"{len(apart)} parts ({sum(apart):.0f} m2) have no door to the largest")
     return build_floor(
         name,
         plan.level,
@@ -215,4 +249,15 @@ def _floor(plan: _Plan, corner: Array, size: Array, anchor: GeoAnchor, elevation
         height=float(size[1]),
         elevation=elevation,
         anchor=anchor,
+        doors=np.array(doors).reshape(-1, 4),
     )
+
+
+def _across(door: Polygon) -> Array:
+    """Clear width (4,) m of a door drawn as an area: the longer middle line of its smallest rectangle."""
+    import shapely
+
+    corners = shapely.get_coordinates(shapely.minimum_rotated_rectangle(to_shapely([door])))
+    middles = 0.5 * (corners[:-1] + corners[1:])
+    lines = np.hstack([middles[:2], middles[2:]])
+    return np.asarray(lines[np.argmax(np.hypot(lines[:, 2] - lines[:, 0], lines[:, 3] - lines[:, 1]))])

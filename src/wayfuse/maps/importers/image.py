@@ -9,6 +9,15 @@ width_m = 42.0                    # of the whole picture; or control points
 control = [{ pixel = [10, 20], lonlat = [13.1, 51.2] }, { pixel = [800, 20], lonlat = [13.2, 51.2] }]
 outline = [[0, 0], [900, 0], [900, 500], [0, 500]]       # pixels; without it the whole picture
 walls = [[[100, 0], [100, 200]], [[100, 240], [100, 500]]]   # lines of pixels; leave doors open
+doors = [[[300, 100], [330, 100]]]                           # or draw walls through and doors on them
+
+[[connectors]]
+id = "main stairs"
+kind = "stairs"                   # stairs, lift, escalator or ramp
+landings = [{ floor = "F1", pixel = [700, 90] }, { floor = "F2", pixel = [705, 120] }]
+n_steps = [24]                    # between each landing and the next; may be left out
+direction = 0                     # 1 up only, -1 down only
+footprint = [[690, 80], [740, 80], [740, 130], [690, 130]]   # pixels of the lowest floor; may be left out
 ```
 Pixels count right and down from the upper left corner, as drawing programs show them; the floor's frame is metres
 right and up from the lower left corner. Two or more control points fix scale, turn and place on the earth by the
@@ -28,16 +37,20 @@ from wayfuse.core.errors import MapError
 from wayfuse.core.frames import GeoAnchor
 from wayfuse.core.types import Array
 from wayfuse.maps.build import build_floor, nominal_elevation
+from wayfuse.maps.connector_entries import read_connector
+from wayfuse.maps.connectors import Connector
 from wayfuse.maps.importers.plan_file import parse_json, read_limited
-from wayfuse.maps.importers.report import FloorReport, ImportReport
-from wayfuse.maps.importers.rooms import cleaned, cut_walls
+from wayfuse.maps.importers.report import FloorReport, ImportReport, Notes
+from wayfuse.maps.importers.rooms import chords, cleaned, cut_walls
 from wayfuse.maps.levels import parse_level
+from wayfuse.maps.problems import KEY, Problem, problems_text
 from wayfuse.maps.site import Floor, Site
 from wayfuse.maps.walls import LARGEST
 
 __all__ = ["image_size", "import_site"]
 
 MISFIT_LIMIT = 1.0  # m, control points further off are reported
+DOOR_DEPTH = 0.1  # m, a door opens walls this near its line
 SCALE_LIMIT = 0.02  # share by which width_m and control points may disagree
 
 
@@ -55,18 +68,64 @@ def import_site(path: Path) -> tuple[Site, ImportReport]:
         raise MapError("has no floors", where=path, remedy="add [[floors]] with name, image and width_m")
     levels = [_level(path, entry) for entry in entries]
     built = []
+    problems: list[Problem] = []
     for level, i in sorted((level, i) for i, level in enumerate(levels)):
         elevation = nominal_elevation(level, has_ground=0 in levels)
-        built.append(_floor(path, entries[i], level, elevation))
+        notes = Notes(str(entries[i]["name"]))
+        built.append(_floor(path, entries[i], level, elevation, notes))
+        problems += notes.problems
     name = document.get("name", path.stem)
     provenance = {
         "importer": "image",
         "source": path.name,
         "images": ", ".join(str(entry["image"]) for entry in entries),
         "frame": "metres right and up from the lower left corner of each picture",
+        KEY: problems_text(problems),
     }
-    site = Site(str(name), tuple(floor for floor, _ in built), provenance)
-    return site, ImportReport(tuple(report for _, report in built))
+    floors = tuple(floor for floor, _, _ in built)
+    rows = {floor.name: (scale, floor.height) for floor, _, scale in built}
+    site = Site(str(name), floors, provenance, _connectors(path, document, rows))
+    return site, ImportReport(tuple(report for _, report, _ in built))
+
+
+def _connectors(
+    path: Path, document: dict[str, Any], frames: dict[str, tuple[float, float]]
+) -> tuple[Connector, ...]:
+    """Connectors of a description; ``frames`` holds metres per pixel and height (m) of each floor, bottom up."""
+    entries = document.get("connectors", [])
+    if not isinstance(entries, list):
+        raise MapError("connectors is no list", where=path, remedy="write [[connectors]]")
+    found = []
+    for entry in entries:
+        try:
+            found.append(read_connector(_in_metres(entry, frames), list(frames)))
+        except MapError as error:
+            raise MapError(error.what, where=path, remedy=error.remedy) from error
+        except (KeyError, TypeError, ValueError, AttributeError) as error:
+            ident = entry.get("id", "?") if isinstance(entry, dict) else "?"
+            raise MapError(
+                f"connector {ident}: {error!r}",
+                where=path,
+                remedy="landings are { floor = NAME, pixel = [x, y] }, footprint a list of [x, y]",
+            ) from error
+    return tuple(found)
+
+
+def _in_metres(entry: dict[str, Any], frames: dict[str, tuple[float, float]]) -> dict[str, Any]:
+    """Entry of a connector with its pixels in metres."""
+
+    def place(floor: str, pixel: Any) -> tuple[float, float]:
+        scale, height = frames[floor]
+        return float(pixel[0]) * scale, height - float(pixel[1]) * scale
+
+    landings = sorted(entry["landings"], key=lambda at: list(frames).index(at["floor"]))
+    places = [(at["floor"], *place(at["floor"], at["pixel"])) for at in landings]
+    ring = entry.get("footprint")
+    return {
+        **entry,
+        "landings": [{"floor": floor, "x": x, "y": y} for floor, x, y in places],
+        "footprint": None if ring is None else [place(places[0][0], pixel) for pixel in ring],
+    }
 
 
 def _document(path: Path) -> Any:
@@ -95,13 +154,15 @@ def _level(path: Path, entry: dict[str, Any]) -> int:
     return found
 
 
-def _floor(path: Path, entry: dict[str, Any], level: int, elevation: float) -> tuple[Floor, FloorReport]:
+def _floor(
+    path: Path, entry: dict[str, Any], level: int, elevation: float, notes: Notes
+) -> tuple[Floor, FloorReport, float]:
+    """Floor, report, and metres per pixel."""
     image = entry.get("image")
     if not isinstance(image, str) or Path(image).name != image:
         raise _wrong(path, entry, f"image {image!r} is no file name", "put the picture beside this file")
     columns, rows = image_size(path.parent / image)
-    warnings: list[str] = []
-    scale, anchor, residual = _frame(path, entry, columns, rows, warnings)
+    scale, anchor, residual = _frame(path, entry, columns, rows, notes)
     if max(columns, rows) * scale > LARGEST:
         raise _wrong(path, entry, f"is wider than {LARGEST:.0f} m", "mend width_m or control")
 
@@ -115,23 +176,39 @@ def _floor(path: Path, entry: dict[str, Any], level: int, elevation: float) -> t
         return np.column_stack([pixels[:, 0], rows - pixels[:, 1]]) * scale
 
     whole = [[0, 0], [columns, 0], [columns, rows], [0, rows]]
-    outline = cleaned([metres(entry.get("outline", whole), "outline")], "outline", warnings)
-    traced = entry.get("walls", [])
-    if not outline or not isinstance(traced, list):
-        raise _wrong(path, entry, "outline encloses nothing, or walls is no list", "trace them anew")
+    outline = cleaned([metres(entry.get("outline", whole), "outline")], "outline", notes)
+    traced, opened = entry.get("walls", []), entry.get("doors", [])
+    if not outline:
+        raise _wrong(path, entry, "outline encloses nothing", "trace it anew")
+    for key, drawn in (("walls", traced), ("doors", opened)):
+        if not isinstance(drawn, list):
+            raise _wrong(path, entry, f"{key} is no list", "give lines of pixels")
     walls = [metres(wall, f"wall {i}") for i, wall in enumerate(traced, 1)]
+    gaps = [_gap(metres(door, f"door {i}")) for i, door in enumerate(opened, 1)]
+    doors = chords([*walls, *(ring for polygon in outline for ring in polygon.rings)], gaps)
+    for i, door in enumerate(doors, 1):
+        if door is None:
+            notes.add("door-on-no-wall", f"door {i}", "a door on no wall: it opens nothing")
     floor = build_floor(
         entry["name"],
         level,
         outline,
-        walls=cut_walls(outline, walls, []),
+        walls=cut_walls(outline, walls, gaps),
         closed=[],
         width=columns * scale,
         height=rows * scale,
         elevation=elevation,
         anchor=anchor,
+        doors=np.array([door for door in doors if door is not None]).reshape(-1, 4),
     )
-    return floor, FloorReport(floor.name, residual, tuple(warnings))
+    return floor, FloorReport(floor.name, residual, tuple(notes)), scale
+
+
+def _gap(door: Array) -> Any:
+    """Area a door opens in the walls."""
+    import shapely
+
+    return shapely.LineString(door).buffer(DOOR_DEPTH, cap_style="flat")
 
 
 def _frame(

@@ -2,8 +2,8 @@
 
 A floor is all levels of one ordinal; its outline is theirs. Units are walked in, except walls, columns, voids and
 plants (`CLOSED`). Walls are the outline and the edges of the units that enclose (all but those in `OPEN`), without
-the parts where an opening lies; space of a level without units is open. Stairs, lifts and other connectors are
-units; provenance lists the levels that relationships join.
+the parts where an opening lies; space of a level without units is open. Openings are doors. Stairs, lifts and
+other connectors are units, joined by relationships or, where there are none, where they overlap (`joining`).
 
 An archive of `wayfuse.maps.importers.imdf_write` carries its own properties ("wayfuse:...") and comes back as it
 was.
@@ -11,7 +11,6 @@ was.
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -25,8 +24,11 @@ from wayfuse.core.types import Array
 from wayfuse.maps.build import build_floor, nominal_elevation
 from wayfuse.maps.importers import geojson
 from wayfuse.maps.importers.imdf_archive import read_archive
-from wayfuse.maps.importers.report import FloorReport, ImportReport
-from wayfuse.maps.importers.rooms import anchor_residual, cleaned, cut_walls, local_anchor
+from wayfuse.maps.importers.imdf_relationships import read_connectors
+from wayfuse.maps.importers.joining import KINDS
+from wayfuse.maps.importers.report import FloorReport, ImportReport, Notes
+from wayfuse.maps.importers.rooms import anchor_residual, chords, cleaned, cut_walls, local_anchor
+from wayfuse.maps.problems import KEY, problems_text
 from wayfuse.maps.site import Floor, Polygon, Site, Unit
 
 __all__ = ["CLOSED", "CONNECTORS", "OPEN", "import_site"]
@@ -35,7 +37,7 @@ __all__ = ["CLOSED", "CONNECTORS", "OPEN", "import_site"]
 CLOSED = frozenset(
     ("brick", "column", "concrete", "drywall", "glass", "opentobelow", "structure", "vegetation", "wood")
 )
-CONNECTORS = frozenset(("elevator", "escalator", "movingwalkway", "ramp", "stairs", "steps"))
+CONNECTORS = frozenset(KINDS)
 # categories whose edge is no wall
 OPEN = CONNECTORS | {
     *("fieldofplay", "footbridge", "lobby", "parking", "platform", "road", "terrace", "unenclosedarea"),
@@ -47,13 +49,14 @@ LEVEL_LIMIT = 200  # ordinals beyond are a mistake
 
 @dataclass(slots=True)
 class _Level:
-    """What is drawn of one ordinal (degrees)."""
+    """What is drawn of one ordinal (degrees); an opening has its id, line and our own mark of doors."""
 
     name: str
     outline: list[tuple[Array, ...]] = field(default_factory=list)
     units: list[tuple[dict[str, Any], tuple[tuple[Array, ...], ...]]] = field(default_factory=list)
-    openings: list[Array] = field(default_factory=list)
+    openings: list[tuple[str, Array, Any]] = field(default_factory=list)
     elevation: float | None = None
+    notes: Notes = field(default_factory=Notes)
 
 
 def import_site(path: Path) -> tuple[Site, ImportReport]:
@@ -70,7 +73,7 @@ def import_site(path: Path) -> tuple[Site, ImportReport]:
     if not isinstance(version, str) or not version.startswith("1.0."):
         raise MapError(f"IMDF version {version!r}, known is 1.0.0", where=path, remedy="export IMDF 1.0.0")
     language = str(manifest.get("language", "en"))
-    notes: list[str] = []
+    notes = Notes()
     levels, ordinals = _levels(path, files, language, notes)
     _add_units(path, files, levels, ordinals, notes)
     _add_openings(path, files, levels, ordinals, notes)
@@ -83,13 +86,18 @@ def import_site(path: Path) -> tuple[Site, ImportReport]:
         raise MapError("no level encloses an area", where=path, remedy="export the venue anew")
     venue = _features(path, files, "venue")
     name = _label(_properties(venue[0]).get("name"), language) if venue else ""
+    storeys = tuple(floor for floor, _ in floors)
+    related = [_properties(feature) for feature in _features(path, files, "relationship")]
+    own = manifest.get("generated_by") == "wayfuse"
+    connectors = read_connectors(storeys, related, _sources(path, files, ordinals), anchor, notes, own=own)
+    problems = [p for k in sorted(levels) for p in levels[k].notes.problems] + notes.problems
     provenance = {
         "importer": "imdf",
         "source": path.name,
         "frame": "metres east and north of the south-west corner of all levels",
-        "connectors": json.dumps(_connectors(path, files, ordinals)),
+        KEY: problems_text(problems),
     }
-    site = Site(name or path.stem, tuple(floor for floor, _ in floors), provenance)
+    site = Site(name or path.stem, storeys, provenance, connectors)
     return site, ImportReport(tuple(report for _, report in floors), tuple(notes))
 
 
@@ -118,7 +126,7 @@ def _label(labels: Any, language: str) -> str:
 
 
 def _levels(
-    path: Path, files: Mapping[str, Any], language: str, notes: list[str]
+    path: Path, files: Mapping[str, Any], language: str, notes: Notes
 ) -> tuple[dict[int, _Level], dict[str, int]]:
     """Levels by ordinal, and the ordinal of each level id."""
     levels: dict[int, _Level] = {}
@@ -134,7 +142,7 @@ def _levels(
         taken = {level.name.casefold() for level in levels.values()}
         if name.casefold() in taken:
             name = f"{name} ({ordinal})"
-        level = levels.setdefault(ordinal, _Level(name or str(ordinal)))
+        level = levels.setdefault(ordinal, _Level(name or str(ordinal), notes=Notes(name or str(ordinal))))
         level.outline += parts
         elevation = properties.get("wayfuse:elevation")
         if isinstance(elevation, float):
@@ -150,7 +158,7 @@ def _add_units(
     files: Mapping[str, Any],
     levels: Mapping[int, _Level],
     ordinals: Mapping[str, int],
-    notes: list[str],
+    notes: Notes,
 ) -> None:
     for feature in _features(path, files, "unit"):
         properties, parts = _properties(feature), geojson.polygons(feature)
@@ -167,7 +175,7 @@ def _add_openings(
     files: Mapping[str, Any],
     levels: Mapping[int, _Level],
     ordinals: Mapping[str, int],
-    notes: list[str],
+    notes: Notes,
 ) -> None:
     for feature in _features(path, files, "opening"):
         points = geojson.line(feature)
@@ -176,31 +184,22 @@ def _add_openings(
             ident = feature.get("id", "") if isinstance(feature, dict) else ""
             notes.append(f"opening {ident}: no line on the earth, or no known level: left out")
         else:
-            levels[ordinal].openings.append(points)
+            ident, held = str(feature.get("id", "")), _properties(feature)
+            levels[ordinal].openings.append((ident, points, held.get("wayfuse:door")))
 
 
-def _connectors(path: Path, files: Mapping[str, Any], ordinals: Mapping[str, int]) -> dict[str, Any]:
-    """Levels that relationships join through units, by the id of the relationship."""
-    level_of: dict[str, int] = {}
-    source: dict[str, str] = {}
+def _sources(
+    path: Path, files: Mapping[str, Any], ordinals: Mapping[str, int]
+) -> dict[str, tuple[int, str, str]]:
+    """Ordinal, id as imported, and category of each unit of a level, by its id in the archive."""
+    found = {}
     for feature in _features(path, files, "unit"):
         properties = _properties(feature)
         ordinal = ordinals.get(str(properties.get("level_id")))
         if ordinal is not None:
             ident = str(feature.get("id", ""))
-            level_of[ident] = ordinal
-            source[ident] = str(properties.get("wayfuse:id") or ident)
-    found: dict[str, Any] = {}
-    for feature in _features(path, files, "relationship"):
-        properties = _properties(feature)
-        ends: Sequence[Any] = [properties.get("origin"), properties.get("destination")]
-        middle = properties.get("intermediary")
-        refs = [*ends, *(middle if isinstance(middle, list) else [])]
-        units = [str(ref.get("id")) for ref in refs if isinstance(ref, dict)]
-        joined = sorted({level_of[unit] for unit in units if unit in level_of})
-        if len(joined) > 1:
-            name = next(source[unit] for unit in units if unit in source)
-            found[name] = {"category": str(properties.get("category", "")), "levels": joined}
+            category = str(properties.get("wayfuse:category") or properties.get("category"))
+            found[ident] = (ordinal, str(properties.get("wayfuse:id") or ident), category)
     return found
 
 
@@ -209,11 +208,11 @@ def _build(
 ) -> tuple[Floor, FloorReport] | None:
     import shapely
 
-    warnings: list[str] = []
+    notes = level.notes
 
     def metres(parts: Sequence[tuple[Array, ...]], what: str) -> list[Polygon]:
         drawn = [[anchor.to_xy(ring) for ring in rings] for rings in parts]
-        return [polygon for rings in drawn for polygon in cleaned(rings, what, warnings)]
+        return [polygon for rings in drawn for polygon in cleaned(rings, what, notes)]
 
     outline = metres(level.outline, f"level {level.name}")
     if not outline:
@@ -229,8 +228,17 @@ def _build(
                 closed.append(polygon)
             if properties.get("wayfuse:enclosed", kind not in OPEN) is True:
                 walled.append(polygon)
-    doors = [shapely.LineString(anchor.to_xy(o)) for o in level.openings]
-    gaps = [door.buffer(OPENING_DEPTH, cap_style="flat") for door in doors]
+    openings = [shapely.LineString(anchor.to_xy(line)) for _, line, _ in level.openings]
+    gaps = [opening.buffer(OPENING_DEPTH, cap_style="flat") for opening in openings]
+    drawn = [ring for polygon in [*outline, *(unit.polygon for unit in units)] for ring in polygon.rings]
+    doors: list[Array] = []
+    for (ident, _, mark), line, door in zip(level.openings, openings, chords(drawn, gaps), strict=True):
+        if mark is True:
+            doors.append(np.asarray(line.coords)[[0, -1]].ravel())
+        elif mark is None and door is None:
+            notes.add("door-on-no-wall", f"opening {ident}", "a door on no wall: it opens nothing")
+        elif mark is None and door is not None:
+            doors.append(door)
     floor = build_floor(
         level.name,
         ordinal,
@@ -244,5 +252,6 @@ def _build(
         if level.elevation is None
         else level.elevation,
         anchor=anchor,
+        doors=np.array(doors).reshape(-1, 4),
     )
-    return floor, FloorReport(floor.name, anchor_residual(anchor, size), tuple(warnings))
+    return floor, FloorReport(floor.name, anchor_residual(anchor, size), tuple(notes))

@@ -1,8 +1,9 @@
 """Write a site as an Indoor Mapping Data Format 1.0.0 archive (OGC 20-094).
 
-Written: manifest, address, venue, building, footprint, level, unit, opening and relationship. An opening is a
-stretch of a unit's edge without wall; a relationship joins the units of one id on several floors. What IMDF has
-no word for goes into properties of our own ("wayfuse:id", "wayfuse:category", ...), which other readers ignore.
+Written: manifest, address, venue, building, footprint, level, unit, opening and relationship. An opening is a door,
+or any stretch of a unit's edge without wall (a door lies on one too); a relationship is a connector and joins its
+units on the floors it serves. What IMDF has no word for goes into properties of our own ("wayfuse:id",
+"wayfuse:category", ...), which other readers ignore.
 Free-standing walls (`indoor=wall`) have no place in IMDF and are left out.
 """
 
@@ -20,6 +21,7 @@ import numpy as np
 from wayfuse.core.errors import MapError
 from wayfuse.core.types import Array
 from wayfuse.maps.importers.imdf import CONNECTORS
+from wayfuse.maps.importers.imdf_relationships import write_connectors
 from wayfuse.maps.importers.rooms import outline_of, to_shapely
 from wayfuse.maps.site import Floor, Polygon, Site, Unit
 
@@ -99,7 +101,7 @@ def write_archive(site: Site, path: Path, created: str) -> None:
         "level": levels,
         "unit": units,
         "opening": openings,
-        "relationship": _relationships(site),
+        "relationship": write_connectors(site, _unit_id),
     }
     manifest = {"version": "1.0.0", "created": created, "language": "en", "generated_by": "wayfuse"}
     documents: dict[str, Any] = {"manifest.json": manifest}
@@ -208,11 +210,11 @@ def _openings(site: Site, floor: Floor, level: str) -> list[dict[str, Any]]:
 
     walls = _drawn(floor).buffer(OPENED)
     edges = [to_shapely([u.polygon]).boundary for u in floor.units if _is_enclosed(floor, u, walls)]
+    doors = [shapely.LineString(door) for door in floor.doors.reshape(-1, 2, 2)]
     bare = shapely.line_merge(shapely.union_all(edges).difference(walls))
+    parts = [part for part in shapely.get_parts(bare) if part.length >= NARROWEST]
     found: list[dict[str, Any]] = []
-    for part in shapely.get_parts(bare):
-        if part.length < NARROWEST:
-            continue
+    for number, part in enumerate([*doors, *parts]):
         points = np.asarray(part.coords)
         properties = {
             "category": "pedestrian",
@@ -223,37 +225,11 @@ def _openings(site: Site, floor: Floor, level: str) -> list[dict[str, Any]]:
             "alt_name": None,
             "display_point": None,
             "level_id": level,
+            "wayfuse:door": number < len(doors),
         }
         geometry = {"type": "LineString", "coordinates": _degrees(floor, points)}
         ident = _id(site.name, "opening", floor.name, str(len(found)))
         found.append(_feature(ident, "opening", geometry, properties))
-    return found
-
-
-def _relationships(site: Site) -> list[dict[str, Any]]:
-    """One for each connector with units of one id on several floors, from the lowest to the highest."""
-    stops: dict[str, list[tuple[str, str]]] = {}
-    for floor in site.floors:
-        here: set[str] = set()
-        for number, unit in enumerate(floor.units):
-            if unit.category in CONNECTORS and unit.id not in here:
-                here.add(unit.id)
-                stop = (_unit_id(site, floor, unit, number), unit.category)
-                stops.setdefault(unit.id, []).append(stop)
-    found: list[dict[str, Any]] = []
-    for ident, units in stops.items():
-        refs = [{"id": unit, "feature_type": "unit"} for unit, _ in units]
-        if len(refs) < 2:
-            continue
-        properties = {
-            "category": units[0][1],
-            "direction": "undirected",
-            "origin": refs[0],
-            "intermediary": refs[1:-1] or None,
-            "destination": refs[-1],
-            "hours": None,
-        }
-        found.append(_feature(_id(site.name, "relationship", ident), "relationship", None, properties))
     return found
 
 

@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import html
 import json
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -25,9 +25,10 @@ from wayfuse.core.errors import MapError
 from wayfuse.core.frames import GeoAnchor
 from wayfuse.core.types import Array
 from wayfuse.maps.build import build_floor, nominal_elevation
-from wayfuse.maps.geometry import clean_polygons
-from wayfuse.maps.importers.report import FloorReport, ImportReport
+from wayfuse.maps.importers.report import FloorReport, ImportReport, Notes
+from wayfuse.maps.importers.rooms import cleaned
 from wayfuse.maps.levels import parse_level, sort_key
+from wayfuse.maps.problems import KEY, Problem, problems_text
 from wayfuse.maps.site import Floor, Polygon, Site, Unit
 from wayfuse.maps.walls import LARGEST
 
@@ -84,14 +85,6 @@ class _Frame:
         return float(max(abs(across - self.width), abs(along - self.height)))
 
 
-@dataclass(slots=True)
-class _Notes:
-    warnings: list[str] = field(default_factory=list)
-
-    def add(self, text: str) -> None:
-        self.warnings.append(text)
-
-
 def import_site(folder: Path) -> tuple[Site, ImportReport]:
     """Site of a folder that holds one folder per floor (B1, F1, ...), and what was met on the way.
 
@@ -123,14 +116,15 @@ def import_site(folder: Path) -> tuple[Site, ImportReport]:
     built = [_import_floor(*floor) for floor in zip(folders, levels, elevations, strict=True)]
     site = Site(
         name=folder.resolve().name,
-        floors=tuple(floor for floor, _ in built),
+        floors=tuple(floor for floor, _, _ in built),
         provenance={
             "importer": "ms-indoor",
             "source": folder.resolve().name,
             "frame": "outline box to picture size",
+            KEY: problems_text(problem for _, _, noted in built for problem in noted),
         },
     )
-    return site, ImportReport(tuple(report for _, report in built), tuple(warnings))
+    return site, ImportReport(tuple(report for _, report, _ in built), tuple(warnings))
 
 
 def _levels(names: list[str]) -> tuple[list[int], list[str]]:
@@ -146,14 +140,14 @@ def _levels(names: list[str]) -> tuple[list[int], list[str]]:
     return levels, warnings
 
 
-def _import_floor(folder: Path, level: int, elevation: float) -> tuple[Floor, FloorReport]:
-    notes = _Notes()
+def _import_floor(folder: Path, level: int, elevation: float) -> tuple[Floor, FloorReport, list[Problem]]:
+    notes = Notes(folder.name)
     width, height = _size(folder / "floor_info.json")
     plan = folder / "geojson_map.json"
     if not plan.exists():
-        notes.add("no geojson_map.json: the outline is the whole picture, without units and WGS84 anchor")
+        notes.append("no geojson_map.json: the outline is the whole picture, without units and WGS84 anchor")
         corners = np.array([[0.0, 0.0], [width, 0.0], [width, height], [0.0, height]])
-        outline, frame = clean_polygons([corners])[0], None
+        outline, frame = cleaned([corners], "outline", notes), None
         units: list[Unit] = []
     else:
         outline, units, frame = _plan(plan, width, height, notes)
@@ -168,8 +162,9 @@ def _import_floor(folder: Path, level: int, elevation: float) -> tuple[Floor, Fl
         anchor=None if frame is None else frame.anchor,
     )
     if not floor.walkable.mask.any():
-        notes.add("no walkable space: units cover the whole outline")
-    return floor, FloorReport(folder.name, None if frame is None else frame.residual, tuple(notes.warnings))
+        notes.append("no walkable space: units cover the whole outline")
+    report = FloorReport(folder.name, None if frame is None else frame.residual, tuple(notes))
+    return floor, report, notes.problems
 
 
 def _size(path: Path) -> tuple[float, float]:
@@ -188,7 +183,7 @@ def _size(path: Path) -> tuple[float, float]:
 
 
 def _plan(
-    path: Path, width: float, height: float, notes: _Notes
+    path: Path, width: float, height: float, notes: Notes
 ) -> tuple[tuple[Polygon, ...], list[Unit], _Frame]:
     collection = _read_json(path)
     features = collection.get("features") if isinstance(collection, dict) else None
@@ -209,46 +204,39 @@ def _plan(
         raise MapError("the outline has no extent", where=path, remedy="fetch the plan anew")
     frame = _Frame(float(west), float(south), float(east), float(north), width, height)
     if frame.residual > RESIDUAL_LIMIT:
-        notes.add(
+        notes.append(
             f"picture and outline disagree by {frame.residual:.1f} m: the frame is stretched to the picture"
         )
     outline: list[Polygon] = []
     for rings in drawn:
-        outline += _cleaned([frame.to_xy(ring) for ring in rings], "outline", notes)
+        outline += cleaned([frame.to_xy(ring) for ring in rings], "outline", notes)
     if not outline:
         raise MapError("the outline encloses no area", where=path, remedy="fetch the plan anew")
     units = [unit for i, feature in enumerate(features[1:], 1) for unit in _units(feature, i, frame, notes)]
     return tuple(outline), units, frame
 
 
-def _units(feature: Any, number: int, frame: _Frame, notes: _Notes) -> list[Unit]:
+def _units(feature: Any, number: int, frame: _Frame, notes: Notes) -> list[Unit]:
     table = feature if isinstance(feature, dict) else {}
     held = table.get("properties")
     properties = held if isinstance(held, dict) else {}
     ident = str(properties.get("id") or table.get("id") or number)
     drawn = _polygons(feature)
     if not drawn:
-        notes.add(f"unit {ident}: no polygon with coordinates on the earth, left out")
+        notes.add("faulty-polygon", f"unit {ident}", "no polygon with coordinates on the earth, left out")
     units = []
     for rings in drawn:
-        for polygon in _cleaned([frame.to_xy(ring) for ring in rings], f"unit {ident}", notes):
+        for polygon in cleaned([frame.to_xy(ring) for ring in rings], f"unit {ident}", notes):
             low, high = polygon.exterior.min(axis=0), polygon.exterior.max(axis=0)
             if np.any(low < -OUTLINE_MARGIN) or np.any(
                 high > np.add((frame.width, frame.height), OUTLINE_MARGIN)
             ):
-                notes.add(f"unit {ident}: lies off the floor, left out")
+                notes.add("faulty-polygon", f"unit {ident}", "lies off the floor, left out")
                 continue
             units.append(
                 Unit(ident, html.unescape(str(properties.get("name") or "")), _category(properties), polygon)
             )
     return units
-
-
-def _cleaned(rings: list[Array], what: str, notes: _Notes) -> tuple[Polygon, ...]:
-    polygons, fault = clean_polygons(rings)
-    if fault:
-        notes.add(f"{what}: {fault}, {'repaired' if polygons else 'left out'}")
-    return polygons
 
 
 def _category(properties: dict[str, Any]) -> str:

@@ -4,16 +4,17 @@ Rooms (`indoor=room`), corridors and areas are units people walk in. A room has 
 a `door=*` or `entrance=*` node lies on it; the edge of a corridor or area is a wall only where nothing adjoins,
 for its neighbours carry the walls. `indoor=wall` ways are walls, closed ones solid units `wall`. `level` and
 `repeat_on` take lists and ranges ("0;1", "-1-3"); an object drawn for several levels is a unit of each. Parts of
-levels ("0.5") have no floor of their own and are left out, nor have levels of stairs and lifts only.
+levels ("0.5") have no floor of their own and are left out. A level that only stairs or lifts reach is a floor of
+nothing but those, for people get there and leave again.
 
-Connectors (stairs, escalators, lifts) are units of every level they serve; provenance lists those levels. Steps
-drawn as a line get their `width`, else `STAIRS_WIDTH`; a lift drawn as a point is a square of `LIFT_SIZE`.
-Nothing encloses them but `indoor=room` with a door: most are drawn without.
+Connectors (stairs, escalators, lifts) are units of every level they serve and are joined across levels (`joining`).
+Steps drawn as a line get their `width`, else `STAIRS_WIDTH`, and land at its ends where `incline` tells which is up;
+a lift drawn as a point is a square of `LIFT_SIZE`. Nothing encloses them but `indoor=room` with a door: most are
+drawn without.
 """
 
 from __future__ import annotations
 
-import json
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -26,17 +27,21 @@ from wayfuse.core.errors import MapError
 from wayfuse.core.frames import GeoAnchor
 from wayfuse.core.types import Array
 from wayfuse.maps.build import build_floor, nominal_elevation
+from wayfuse.maps.importers.joining import KINDS, Piece, join_pieces
+from wayfuse.maps.importers.osm_connectors import piece_of
 from wayfuse.maps.importers.osm_elements import Element, read_elements
-from wayfuse.maps.importers.report import FloorReport, ImportReport
+from wayfuse.maps.importers.report import FloorReport, ImportReport, Notes
 from wayfuse.maps.importers.rooms import (
     DOOR_WIDTH,
     anchor_residual,
+    chords,
     cleaned,
     cut_walls,
     local_anchor,
     outline_of,
     to_shapely,
 )
+from wayfuse.maps.problems import KEY, problems_text
 from wayfuse.maps.site import Floor, Polygon, Site, Unit
 
 __all__ = ["import_site", "parse_levels"]
@@ -59,8 +64,8 @@ class _Level:
     rooms: list[Unit] = field(default_factory=list)
     solid: list[Polygon] = field(default_factory=list)
     lines: list[Array] = field(default_factory=list)
-    doors: list[Any] = field(default_factory=list)
-    warnings: list[str] = field(default_factory=list)
+    doors: list[tuple[str, Any]] = field(default_factory=list)
+    notes: Notes = field(default_factory=Notes)
 
 
 def parse_levels(text: str) -> tuple[int, ...]:
@@ -88,7 +93,7 @@ def import_site(path: Path) -> tuple[Site, ImportReport]:
     MapError : the file cannot be read, or holds no room, corridor or area with a level.
     """
     path = Path(path)
-    notes: list[str] = []
+    notes = Notes()
     elements = read_elements(path, notes)
     drawn = [e for e in elements if _category(e) in (*AREAS, *CONNECTORS) or _is_wall(e)]
     areas = [e for e in drawn if e.polygons and _levels(e)]
@@ -101,35 +106,46 @@ def import_site(path: Path) -> tuple[Site, ImportReport]:
     points = np.concatenate([rings[0] for e in areas for rings in e.polygons])
     anchor = local_anchor(points, path)
     size = anchor.to_xy(points.max(axis=0))
-    levels: dict[int, _Level] = {k: _Level() for e in areas if _category(e) in AREAS for k in _levels(e)}
-    bare = {k for e in areas for k in _levels(e)} - levels.keys()
-    notes += [f"level {k} has only stairs or lifts: it is no floor" for k in sorted(bare)]
+    levels: dict[int, _Level] = {}
+    for e in drawn:
+        for k in _levels(e) if _category(e) else ():
+            levels.setdefault(k, _Level(notes=Notes(str(k))))
+    bare = levels.keys() - {k for e in areas if _category(e) in AREAS for k in _levels(e)}
+    notes += [f"level {k} has only stairs or lifts: a floor of nothing but them" for k in sorted(bare)]
     missed = sum(not _draw(element, anchor, levels) for element in drawn)
     if missed:
-        notes.append(f"{missed} indoor objects without a whole level that has rooms: left out")
+        notes.append(f"{missed} indoor objects without a whole level: left out")
     for element in elements:
         _add_door(element, anchor, levels)
     built = [_build(level, levels[level], size, anchor, 0 in levels) for level in sorted(levels)]
     floors = [item for item in built if item is not None]
     if not floors:
         raise MapError("no room encloses an area", where=path, remedy="mend the drawing")
-    site = Site(path.stem, tuple(floor for floor, _ in floors), _provenance(path, drawn, levels))
-    return site, ImportReport(tuple(report for _, report in floors), tuple(notes))
-
-
-def _provenance(path: Path, drawn: list[Element], levels: Mapping[int, _Level]) -> dict[str, str]:
-    served = {
-        e.id: {"category": _category(e), "levels": [k for k in _levels(e) if k in levels]}
-        for e in drawn
-        if _category(e) in CONNECTORS and not levels.keys().isdisjoint(_levels(e))
-    }
-    return {
+    storeys = tuple(floor for floor, _ in floors)
+    connectors = join_pieces(storeys, _pieces(drawn, storeys, anchor), notes)
+    problems = [p for k in sorted(levels) for p in levels[k].notes.problems] + notes.problems
+    provenance = {
         "importer": "osm",
         "source": path.name,
         "frame": "metres east and north of the south-west corner of all floors",
-        "connectors": json.dumps(served),
         "licence": "Open Database License, (c) OpenStreetMap contributors",
+        KEY: problems_text(problems),
     }
+    site = Site(path.stem, storeys, provenance, connectors)
+    return site, ImportReport(tuple(report for _, report in floors), tuple(notes))
+
+
+def _pieces(drawn: list[Element], floors: tuple[Floor, ...], anchor: GeoAnchor) -> list[Piece]:
+    """Pieces of connectors, as drawn on the floors there are."""
+    index = {floor.level: i for i, floor in enumerate(floors)}
+    found: list[Piece] = []
+    for element in drawn:
+        category = _category(element)
+        served = tuple(index[k] for k in _levels(element) if k in index)
+        shape = to_shapely(_polygons(element, anchor, Notes())) if category in CONNECTORS and served else None
+        if shape is not None and not shape.is_empty:
+            found.append(piece_of(element, KINDS[category], shape, served, anchor))
+    return found
 
 
 def _category(element: Element) -> str:
@@ -169,7 +185,7 @@ def _draw(element: Element, anchor: GeoAnchor, levels: Mapping[int, _Level]) -> 
             level.lines.append(anchor.to_xy(element.line))
         return True
     for i, level in enumerate(where):
-        for polygon in _polygons(element, anchor, level.warnings if i == 0 else []):
+        for polygon in _polygons(element, anchor, level.notes if i == 0 else Notes()):
             unit = Unit(element.id, _name(element.tags), _kind(element, category), polygon)
             level.units.append(unit)
             if not category:
@@ -196,14 +212,14 @@ def _kind(element: Element, category: str) -> str:
     return use if use not in ("yes", "") else "room"
 
 
-def _polygons(element: Element, anchor: GeoAnchor, warnings: list[str]) -> list[Polygon]:
+def _polygons(element: Element, anchor: GeoAnchor, notes: Notes) -> list[Polygon]:
     import shapely
 
     if element.polygons:
         return [
             polygon
             for rings in element.polygons
-            for polygon in cleaned([anchor.to_xy(ring) for ring in rings], element.id, warnings)
+            for polygon in cleaned([anchor.to_xy(ring) for ring in rings], element.id, notes)
         ]
     if element.line is not None:
         half = 0.5 * _width(element.tags, STAIRS_WIDTH)
@@ -214,7 +230,7 @@ def _polygons(element: Element, anchor: GeoAnchor, warnings: list[str]) -> list[
     else:
         return []
     parts = [part for part in shapely.get_parts(shape) if part.geom_type == "Polygon"]
-    return [p for part in parts for p in cleaned([np.asarray(part.exterior.coords)], element.id, warnings)]
+    return [p for part in parts for p in cleaned([np.asarray(part.exterior.coords)], element.id, notes)]
 
 
 def _width(tags: Mapping[str, str], default: float) -> float:
@@ -233,7 +249,7 @@ def _add_door(element: Element, anchor: GeoAnchor, levels: Mapping[int, _Level])
     disc = shapely.Point(anchor.to_xy(element.point)).buffer(0.5 * _width(tags, DOOR_WIDTH))
     for level in _levels(element) if "level" in tags else levels:
         if level in levels:
-            levels[level].doors.append(disc)
+            levels[level].doors.append((element.id if "level" in tags else "", disc))
 
 
 def _build(
@@ -244,7 +260,8 @@ def _build(
     outline = outline_of(unit.polygon for unit in drawn.units if unit.category != "wall")
     if not outline:
         return None
-    doors = shapely.union_all(drawn.doors)
+    discs = [disc for _, disc in drawn.doors]
+    doors = shapely.union_all(discs)
     shapely.prepare(doors)
     walled, shut = [], 0
     for unit in drawn.rooms:
@@ -253,17 +270,25 @@ def _build(
             walled.append(unit.polygon)
             shut += not has_door
     if shut:
-        drawn.warnings.append(f"{shut} of {len(drawn.rooms)} rooms have no door: nobody gets in or out")
+        drawn.notes.append(f"{shut} of {len(drawn.rooms)} rooms have no door: nobody gets in or out")
+    closed = [*outline, *walled, *drawn.solid]
+    edges = [ring for polygon in closed for ring in polygon.rings] + drawn.lines
+    edges += [ring for unit in drawn.units for ring in unit.polygon.rings]  # a door between two corridors
+    openings = chords(edges, discs)
+    for (ident, _), chord in zip(drawn.doors, openings, strict=True):
+        if chord is None and ident:  # one without a level lies on some level's walls only
+            drawn.notes.add("door-on-no-wall", ident, "a door on no wall: it opens nothing")
     floor = build_floor(
         str(level),
         level,
         outline,
         drawn.units,
-        walls=cut_walls([*outline, *walled, *drawn.solid], drawn.lines, drawn.doors),
+        walls=cut_walls(closed, drawn.lines, discs),
         closed=drawn.solid,
         width=float(size[0]),
         height=float(size[1]),
         elevation=nominal_elevation(level, has_ground=has_ground),
         anchor=anchor,
+        doors=np.array([chord for chord in openings if chord is not None]).reshape(-1, 4),
     )
-    return floor, FloorReport(floor.name, anchor_residual(anchor, size), tuple(drawn.warnings))
+    return floor, FloorReport(floor.name, anchor_residual(anchor, size), tuple(drawn.notes))

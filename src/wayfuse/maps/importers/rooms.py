@@ -14,12 +14,14 @@ from wayfuse.core.errors import MapError
 from wayfuse.core.frames import GeoAnchor, metres_per_degree
 from wayfuse.core.types import Array
 from wayfuse.maps.geometry import clean_polygons, from_shapely, normalise_walls
+from wayfuse.maps.importers.report import Notes
 from wayfuse.maps.site import Polygon
 from wayfuse.maps.walls import LARGEST
 
 __all__ = [
     "DOOR_WIDTH",
     "anchor_residual",
+    "chords",
     "cleaned",
     "cut_walls",
     "local_anchor",
@@ -56,11 +58,13 @@ def anchor_residual(anchor: GeoAnchor, size: Array) -> float:
     return float(np.max(np.abs(found - size)))
 
 
-def cleaned(rings: Sequence[Array], what: str, warnings: list[str]) -> tuple[Polygon, ...]:
-    """Valid polygons of drawn rings (m); what had to be repaired or left out is added to ``warnings``."""
+def cleaned(rings: Sequence[Array], what: str, notes: Notes) -> tuple[Polygon, ...]:
+    """Valid polygons of drawn rings (m); what had to be repaired or left out is added to ``notes``."""
     polygons, fault = clean_polygons(rings)
     if fault:
-        warnings.append(f"{what}: {fault}, {'repaired' if polygons else 'left out'}")
+        crossing = "intersection" in fault.casefold()
+        kind = "self-crossing-polygon" if crossing else "faulty-polygon"
+        notes.add(kind, what, f"{fault}, {'repaired' if polygons else 'left out'}")
     return polygons
 
 
@@ -94,6 +98,23 @@ def cut_walls(polygons: Iterable[Polygon], lines: Iterable[Array], openings: Ite
         return np.empty((0, 4))
     solid = shapely.union_all(drawn).difference(shapely.union_all(list(openings)))
     return normalise_walls(np.concatenate([_segments(part) for part in shapely.get_parts(_snapped(solid))]))
+
+
+def chords(lines: Iterable[Array], openings: Sequence[Any]) -> list[Array | None]:
+    """Chord (4,) m that each opening (a shapely area) cuts out of drawn lines (k, 2), None where it meets none."""
+    import shapely
+
+    drawn = [shapely.LineString(line) for line in lines if len(line) > 1]
+    tree = shapely.STRtree(drawn)
+    found: list[Array | None] = []
+    for opening in openings:
+        cut = [drawn[i].intersection(opening) for i in tree.query(opening, predicate="intersects")]
+        parts = [p for p in shapely.get_parts(cut) if p.geom_type == "LineString" and p.length > DETAIL]
+        merged: Any = shapely.get_parts(shapely.line_merge(shapely.union_all(parts))) if parts else []
+        longest = max(merged, key=lambda part: float(part.length), default=None)
+        ends = None if longest is None else np.asarray(longest.coords)[[0, -1], :2].ravel()
+        found.append(ends if ends is not None and np.hypot(*(ends[2:] - ends[:2])) > DETAIL else None)
+    return found
 
 
 def _segments(line: Any) -> Array:

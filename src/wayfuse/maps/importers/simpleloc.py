@@ -3,14 +3,13 @@
 The outline of a floor is its polygons of method 0 less those of method 1. `wall` and `line` (a handrail) are walls;
 a `door` of a wall is an opening of its `width` from the share `x01` of the wall, towards its start where `lr` is
 true (so all 116 doors of the public file lie on their walls). Each `stair` is a unit of its floor and, where its
-last `z2` reaches it, of the one above; provenance lists the levels. Floors are sorted by `atHeight`, their
-elevation. Rooms are not drawn as areas, so connectors are the only units. The file names no place on the earth; x is
-taken as right and y as up.
+last `z2` reaches it, of the one above; it lands where its first part begins and its last one ends. Floors are
+sorted by `atHeight`, their elevation. Rooms are not drawn as areas, so connectors are the only units. The file
+names no place on the earth; x is taken as right and y as up.
 """
 
 from __future__ import annotations
 
-import json
 import re
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -23,10 +22,12 @@ from wayfuse.core.errors import MapError
 from wayfuse.core.types import Array
 from wayfuse.maps.build import build_floor
 from wayfuse.maps.geometry import from_shapely
+from wayfuse.maps.importers.joining import KINDS, Piece, join_pieces
 from wayfuse.maps.importers.plan_file import parse_xml, read_limited
-from wayfuse.maps.importers.report import FloorReport, ImportReport
-from wayfuse.maps.importers.rooms import cleaned, cut_walls, outline_of, to_shapely
+from wayfuse.maps.importers.report import FloorReport, ImportReport, Notes
+from wayfuse.maps.importers.rooms import chords, cleaned, cut_walls, outline_of, to_shapely
 from wayfuse.maps.levels import parse_level
+from wayfuse.maps.problems import KEY, problems_text
 from wayfuse.maps.site import Floor, Polygon, Site, Unit
 from wayfuse.maps.walls import LARGEST
 
@@ -48,7 +49,7 @@ class _Storey:
     elevation: float
     level: int = 0
     units: list[Unit] = field(default_factory=list)
-    warnings: list[str] = field(default_factory=list)
+    notes: Notes = field(default_factory=Notes)
 
 
 def import_site(path: Path) -> tuple[Site, ImportReport]:
@@ -68,23 +69,29 @@ def import_site(path: Path) -> tuple[Site, ImportReport]:
         for i, node in enumerate(nodes)
     ]
     storeys.sort(key=lambda storey: storey.elevation)
+    for storey in storeys:
+        storey.notes.floor = storey.name
     _set_levels(storeys)
-    served = _add_connectors(path, storeys)
+    pieces = _add_connectors(path, storeys)
     outlines = [_outline(path, storey) for storey in storeys]
     corners = np.concatenate([p.exterior for outline in outlines for p in outline])
     if float(np.max(np.abs(corners))) > LARGEST:
         raise MapError(f"spans more than {LARGEST:.0f} m", where=path, remedy="mend the outline")
     size = corners.max(axis=0)
     floors = [_floor(path, s, outline, size) for s, outline in zip(storeys, outlines, strict=True)]
+    notes = Notes()
+    connectors = join_pieces(floors, pieces, notes)
+    problems = [problem for storey in storeys for problem in storey.notes.problems] + notes.problems
     provenance = {
         "importer": "simpleloc",
         "source": path.name,
         "frame": "metres of the file, y taken as up",
-        "connectors": json.dumps(served),
+        KEY: problems_text(problems),
     }
-    reports = [FloorReport(s.name, None, tuple(s.warnings)) for s in storeys]
+    reports = [FloorReport(s.name, None, tuple(s.notes)) for s in storeys]
     name = path.resolve().parent.name if path.stem == "building" else path.stem
-    return Site(name, tuple(floors), provenance), ImportReport(tuple(reports))
+    site = Site(name, tuple(floors), provenance, connectors)
+    return site, ImportReport(tuple(reports), tuple(notes))
 
 
 def _number(path: Path, node: Element, key: str) -> float:
@@ -110,13 +117,13 @@ def _set_levels(storeys: list[_Storey]) -> None:
             level = 0
         if level is None:
             level = storeys[i - 1].level + 1 if i else 0
-            storey.warnings.append(f"name {storey.name!r} does not say its level: taken as {level}")
+            storey.notes.append(f"name {storey.name!r} does not say its level: taken as {level}")
         storey.level = level
 
 
-def _add_connectors(path: Path, storeys: list[_Storey]) -> dict[str, Any]:
-    """Add stairs and lifts to the floors they serve: category and levels of each by id."""
-    served: dict[str, Any] = {}
+def _add_connectors(path: Path, storeys: list[_Storey]) -> list[Piece]:
+    """Add stairs and lifts to the units of the floors they serve, and give them as pieces of connectors."""
+    pieces: list[Piece] = []
     for i, storey in enumerate(storeys):
         above = storeys[i + 1 : i + 2]
         for kind, tag in (("stairs", "stairs/stair"), ("elevator", "elevators/elevator")):
@@ -129,8 +136,20 @@ def _add_connectors(path: Path, storeys: list[_Storey]) -> dict[str, Any]:
                 for polygon in from_shapely(shape):
                     for other in (storey, *reached):
                         other.units.append(Unit(ident, "", kind, polygon))
-                served[ident] = {"category": kind, "levels": [s.level for s in (storey, *reached)]}
-    return served
+                floors = (i, i + 1) if reached else (i,)
+                pieces.append(Piece(ident, KINDS[kind], shape, floors, places=_places(path, node, floors)))
+    return pieces
+
+
+def _places(path: Path, node: Element, floors: tuple[int, ...]) -> dict[int, tuple[float, float]]:
+    """Where stairs begin on their lowest floor and end on their highest."""
+    parts = node.findall("part")
+    if not parts or len(floors) < 2:
+        return {}
+    first = min(parts, key=lambda part: _number(path, part, "z1"))
+    last = max(parts, key=lambda part: _number(path, part, "z2"))
+    (x0, y0), (x1, y1) = _ends(path, first)[0].tolist(), _ends(path, last)[1].tolist()
+    return {floors[0]: (x0, y0), floors[-1]: (x1, y1)}
 
 
 def _stairs(path: Path, node: Element) -> Any:
@@ -167,7 +186,7 @@ def _outline(path: Path, storey: _Storey) -> tuple[Polygon, ...]:
     for node in storey.node.findall("outline/polygon"):
         points = [[_number(path, p, "x"), _number(path, p, "y")] for p in node.findall("point")]
         ring = np.array(points, dtype=np.float64).reshape(-1, 2)
-        polygons = cleaned([ring], f"outline {node.get('name', '')}", storey.warnings)
+        polygons = cleaned([ring], f"outline {node.get('name', '')}", storey.notes)
         (removed if node.get("method") == "1" else added).extend(polygons)
     connectors = to_shapely(unit.polygon for unit in storey.units)
     whole = to_shapely(added).difference(to_shapely(removed)).union(connectors)
@@ -178,13 +197,16 @@ def _outline(path: Path, storey: _Storey) -> tuple[Polygon, ...]:
 
 
 def _floor(path: Path, storey: _Storey, outline: tuple[Polygon, ...], size: Array) -> Floor:
-    lines, doors = [], []
+    lines: list[Array] = []
+    doors: list[Any] = []
     for node in storey.node.findall("obstacles/*"):
         if node.tag not in ("wall", "line"):
             continue
         ends = _ends(path, node)
         lines.append(ends)
         doors += [_door(path, door, ends, storey) for door in node.findall("door")]
+    rings = [ring for polygon in outline for ring in polygon.rings]
+    openings = [chord for chord in chords([*lines, *rings], doors) if chord is not None]
     return build_floor(
         storey.name,
         storey.level,
@@ -195,6 +217,7 @@ def _floor(path: Path, storey: _Storey, outline: tuple[Polygon, ...], size: Arra
         width=float(size[0]),
         height=float(size[1]),
         elevation=storey.elevation,
+        doors=np.array(openings).reshape(-1, 4),
     )
 
 
@@ -206,7 +229,9 @@ def _door(path: Path, node: Element, ends: Array, storey: _Storey) -> Any:
     start, width = _number(path, node, "x01") * length, _number(path, node, "width")
     low, high = (start - width, start) if node.get("lr") == "true" else (start, start + width)
     if low < -DOOR_DEPTH or high > length + DOOR_DEPTH:
-        storey.warnings.append(f"a door of {width:g} m at {start:.2f} m leaves its wall of {length:.2f} m")
+        feature = f"door of the wall from {ends[0].tolist()} to {ends[1].tolist()}"
+        fault = f"a door of {width:g} m at {start:.2f} m leaves its wall of {length:.2f} m"
+        storey.notes.add("door-on-no-wall", feature, fault)
     low, high = max(low, 0.0), min(high, length)
     if high <= low:
         return shapely.Polygon()
