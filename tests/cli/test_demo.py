@@ -28,7 +28,14 @@ def content(folder: Path) -> dict[str, bytes]:
 
 def test_all_files_are_there(made: Path) -> None:
     pictures = {str(p.relative_to(made / "pictures")) for p in (made / "pictures").rglob("*.png")}
-    assert {"cdf.png", "error_by_time.png", "coverage.png", "site/F1.png", "site/F2.png"} <= pictures
+    assert {
+        "cdf.png",
+        "error_by_time.png",
+        "coverage.png",
+        "site/0.png",
+        "site/1.png",
+        "site/2.png",
+    } <= pictures
     assert sum(name.startswith("walks/") for name in pictures) == 1
     report = json.loads((made / "report.json").read_text())
     assert tuple(report["methods"]) == METHODS

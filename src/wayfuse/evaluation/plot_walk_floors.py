@@ -46,6 +46,7 @@ __all__ = ["Change", "floor_changes", "floors_figure"]
 _MAX_PANELS = 4
 _PANEL = 5.6  # inches wide
 _TIMES, _AROUND = 1.6, 1.5  # inches: the panel of times, titles and labels
+_ENTRY = 4.0  # inches wide, an entry of the legend
 _NEAR = 8.0  # m from a landing to the waypoint before it: a stairway's half landing is so far
 _PAPER = {"boxstyle": "round,pad=0.12", "fc": "white", "ec": "none", "alpha": 0.75}
 _BADGE = {"boxstyle": "circle,pad=0.22", "fc": TRUTH, "ec": "white", "lw": 1.0}
@@ -87,7 +88,7 @@ def floors_figure(scores: Scores, walk: str, names: list[str], site: Site | None
     title = figure.suptitle(_heading(walk, truth, changes), x=0.005, ha="left", fontsize=11, color=INK)
     title.set_parse_math(False)
     _times(figure.add_subplot(panels[1, :]), scores, truth, names, changes)
-    rows = legend_below(figure, 4)
+    rows = legend_below(figure, int(width / _ENTRY))
     figure.set_size_inches(width, height + ROW * rows)
     return figure
 

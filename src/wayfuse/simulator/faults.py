@@ -22,13 +22,17 @@ __all__ = [
     "gyro_spike",
     "joined_lines",
     "late_records",
+    "pressure_step",
     "text_clock_jump",
     "truncated_text",
     "unknown_access_points",
     "with_not_finite",
     "without_imu",
+    "without_pressure",
     "without_wifi",
 ]
+
+_HPA_PER_M = 0.12  # of air near the ground
 
 
 def without_wifi(recording: Recording, after: float = -np.inf, until: float = np.inf) -> Recording:
@@ -49,6 +53,21 @@ def without_imu(recording: Recording, after: float = -np.inf, until: float = np.
         rotation_rate=cut(recording.rotation_rate),
         magnetic_field=cut(recording.magnetic_field),
         orientation=cut(recording.orientation),
+    )
+
+
+def without_pressure(recording: Recording) -> Recording:
+    """A phone that has no barometer."""
+    return replace(recording, pressure=Series.empty(1))
+
+
+def pressure_step(recording: Recording, at: float, metres: float) -> Recording:
+    """From ``at`` (s) on the pressure is that of a place ``metres`` higher: a door opens and stays open."""
+    series = recording.pressure
+    later = (series.t >= at)[:, None]
+    return replace(
+        recording,
+        pressure=Series(series.t, np.where(later, series.values - _HPA_PER_M * metres, series.values)),
     )
 
 
@@ -134,13 +153,14 @@ def truncated_text(text: str, share: float) -> str:
 
 
 def garbled_text(text: str, rng: np.random.Generator, share: float) -> str:
-    """A share of the record lines loses its last field or has letters for a number; the header stays."""
+    """A share of the record lines loses its last fields or has letters for a number; the header stays."""
     out = []
+    mark, between = _layout(text)
     for line in text.splitlines():
         broken = line
-        if not line.startswith("#") and rng.random() < share:
-            fields = line.split("\t")
-            broken = "\t".join(
+        if not line.startswith(mark) and rng.random() < share:
+            fields = line.split(between)
+            broken = between.join(
                 fields[:-2] if rng.random() < 0.5 else [*fields[:2], "x1.2", *fields[3:-1], "no"]
             )
         out.append(broken)
@@ -151,8 +171,9 @@ def joined_lines(text: str, every: int) -> str:
     """Every ``every``-th line end between two records is missing, as in some of the public files."""
     lines = text.splitlines()
     out: list[str] = []
+    mark, _ = _layout(text)
     for i, line in enumerate(lines):
-        join = i % every == every - 1 and not line.startswith("#") and not lines[i - 1].startswith("#")
+        join = i % every == every - 1 and not line.startswith(mark) and not lines[i - 1].startswith(mark)
         if join and out:
             out[-1] += line
         else:
@@ -163,11 +184,22 @@ def joined_lines(text: str, every: int) -> str:
 def text_clock_jump(text: str, share: float, ms: int) -> str:
     """After a share of the lines, every record's time is ``ms`` milliseconds ahead, negative: back."""
     lines = text.splitlines()
+    mark, between = _layout(text)
     for i in range(int(share * len(lines)), len(lines)):
-        time, tab, rest = lines[i].partition("\t")
-        if time.isdigit():
+        if lines[i].startswith(mark):
+            continue
+        if between == ";":  # kind; time in s; ...
+            kind, time, rest = lines[i].split(";", 2)
+            lines[i] = f"{kind};{float(time) + ms / 1000:.4f};{rest}"
+        else:
+            time, tab, rest = lines[i].partition("\t")
             lines[i] = f"{int(time) + ms}{tab}{rest}"
     return "\n".join(lines) + "\n"
+
+
+def _layout(text: str) -> tuple[str, str]:
+    """How a file marks its header lines, and what is between fields: ms-indoor text, or GetSensorData log."""
+    return ("%", ";") if text.startswith("%") else ("#", "\t")
 
 
 def _moved(record: Record, seconds: float) -> Record:

@@ -15,7 +15,7 @@ from wayfuse.core.types import Array, IntArray
 from wayfuse.simulator.radio_field import RadioField
 from wayfuse.simulator.walker import Walk
 
-__all__ = ["ScannerModel", "Sweep", "scan"]
+__all__ = ["ScannerModel", "Sweep", "between_floors", "scan"]
 
 _NO_SHARE = 1e-9  # of a storey in what is heard: less is rounding
 
@@ -118,13 +118,13 @@ def _levels(walk: Walk, floor: int, radios: RadioField, heard_at: Array, model: 
     if walk.climb is None:
         level = radios.rssi(radio, xy, floor)
     else:
-        level = _between_floors(radios, radio, xy, np.interp(flat, walk.t, walk.climb.z))
+        level = between_floors(radios, radio, xy, np.interp(flat, walk.t, walk.climb.z))
     away = radios.ap_xy[radios.ap[radio]] - xy
     ahead = np.cos(np.arctan2(away[:, 1], away[:, 0]) - heading)
     return np.asarray((level - 0.5 * model.body_db * (1.0 - ahead)).reshape(shape))
 
 
-def _between_floors(radios: RadioField, radio: IntArray, xy: Array, z: Array) -> Array:
+def between_floors(radios: RadioField, radio: IntArray, xy: Array, z: Array) -> Array:
     """RSSI (m,) dBm at heights z (m,) m: between two storeys it goes over from one's to the other's in dB."""
     elevation = np.array([storey.elevation for storey in radios.storeys])
     lower = np.clip(np.searchsorted(elevation, z, side="right") - 1, 0, len(elevation) - 2)
