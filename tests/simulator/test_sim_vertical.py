@@ -217,7 +217,9 @@ def test_a_scenario_file_names_the_new_parts(tmp_path):
     assert (scenario.barometer.rate_hz, scenario.lift.speed) == (5.0, 1.6)
 
 
-@pytest.mark.parametrize("table", ["changes = -1", "[barometer]\nrate_hz = -1.0", "[lift]\nspeed = 0.0"])
+@pytest.mark.parametrize(
+    "table", ["changes = -1", "[barometer]\nrate_hz = -1.0", "[lift]\nspeed = 0.0", "visit_m = [9.0, 3.0]"]
+)
 def test_a_scenario_that_cannot_be_is_refused(tmp_path, table):
     path = tmp_path / "s.toml"
     path.write_text(table)

@@ -36,7 +36,7 @@ class DemoFiles:
 
 def smallest() -> Scenario:
     """The least that runs every part: one survey walk on each floor and one walk to track."""
-    return Scenario(survey_walks=2, test_walks=1, duration_s=(20.0, 25.0))
+    return Scenario(survey_walks=2, test_walks=1, duration_s=(20.0, 25.0), visit_m=(3.0, 14.0))
 
 
 def write_demo(folder: Path, seed: int, scenario: Scenario | None = None) -> DemoFiles:

@@ -22,7 +22,6 @@ from wayfuse.simulator.travel import Leg
 __all__ = ["Journey", "Trip", "draw_trips", "plan_journey", "stay"]
 
 _NEAR = 0.5  # m, a node this near to a landing is the landing's
-_WAY = (14.0, 34.0)  # m a visitor goes on a floor
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,6 +72,7 @@ def plan_journey(
     rng: np.random.Generator,
     *,
     lifts: LiftModel,
+    visit: tuple[float, float] = (14.0, 34.0),
     wander: float = 0.6,
     pause_share: float = 0.15,
     pause_range: tuple[float, float] = (2.0, 5.0),
@@ -81,6 +81,7 @@ def plan_journey(
 
     Parameters
     ----------
+    visit : shortest and longest way on each floor, m, where the floor has one.
     wander : how far beside a node one passes, m (largest, per axis).
     pause_share, pause_range : share of inner way-points at which one stands, and for how long (s).
     """
@@ -92,9 +93,8 @@ def plan_journey(
     floor = start
     for trip in [*trips, None]:
         passage = None if trip is None else building.passages[trip.passage]
-        ways = _wander(
-            building, floor, node, None if passage is None else _landing_node(building, floor, passage), rng
-        )
+        goal = None if passage is None else _landing_node(building, floor, passage)
+        ways = _wander(building, floor, node, goal, visit, rng)
         legs += _level_legs(building.storeys[floor], floor, ways, place, wander, passage is not None, rng)
         _pause(legs, len(ways) - 1, pause_share, pause_range, rng)
         if trip is None or passage is None:
@@ -127,7 +127,12 @@ def _inner(building: Building, floor: int) -> list[int]:
 
 
 def _wander(
-    building: Building, floor: int, node: int, goal: int | None, rng: np.random.Generator
+    building: Building,
+    floor: int,
+    node: int,
+    goal: int | None,
+    visit: tuple[float, float],
+    rng: np.random.Generator,
 ) -> list[int]:
     """Nodes to pass after ``node``: to a place of interest, then to the goal (the place is the goal where None)."""
     storey, inner = building.storeys[floor], _inner(building, floor)
@@ -138,7 +143,7 @@ def _wander(
         second = [] if goal is None else _shortest(storey, middle, goal)
         best = [*first, *second]
         turns_back = bool(first and second) and second[0] == [node, *first][-2]
-        if _WAY[0] <= _length(storey, [node, *best]) <= _WAY[1] and not turns_back:
+        if visit[0] <= _length(storey, [node, *best]) <= visit[1] and not turns_back:
             break
     return best or [int(rng.choice(_neighbours(storey, node)))]
 

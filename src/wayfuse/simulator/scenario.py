@@ -45,6 +45,7 @@ class Scenario:
     pause_s: tuple[float, float] = (2.0, 5.0)
     stated_sigma: float = 0.1  # m, how well a surveyor states where he is
     changes: int = 2  # of floors on a walk to track, where there are stairs or lifts
+    visit_m: tuple[float, float] = (14.0, 34.0)  # shortest and longest way on each of its floors
     tracked_offset_db: tuple[float, float] = (
         0.0,
         0.0,
@@ -63,6 +64,8 @@ class Scenario:
             )
         if self.survey_walks < 0 or self.test_walks < 0 or self.changes < 0:
             raise ConfigError("survey_walks, test_walks and changes must not be negative")
+        if not 0.0 <= self.visit_m[0] <= self.visit_m[1]:
+            raise ConfigError(f"visit_m: {self.visit_m}", remedy="shortest and longest way on a floor in m")
         if self.scanner.period_s <= 0.0 or self.imu.rate_hz <= 0.0:
             raise ConfigError("scanner.period_s and imu.rate_hz must be positive")
         if self.barometer.rate_hz < 0.0:

@@ -111,6 +111,7 @@ def simulate_journey(
         changes,
         rng,
         lifts=scenario.lift,
+        visit=scenario.visit_m,
         wander=scenario.wander_m,
         pause_share=scenario.pause_share,
         pause_range=scenario.pause_s,
