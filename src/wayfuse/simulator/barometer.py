@@ -74,7 +74,7 @@ def _draughts(t: Array, model: BarometerModel, rng: np.random.Generator) -> Arra
         part = np.clip((t - start) / length, 0.0, 1.0)
         turns = 0.5 if rng.random() < model.lasting_share else 1.0
         air += size * 0.5 * (1.0 - np.cos(2.0 * np.pi * turns * part))
-    return air
+    return np.clip(air, -model.draught_m[1], model.draught_m[1])
 
 
 def _lagged(values: Array, time: float) -> Array:
