@@ -145,11 +145,10 @@ def _wander(
         turns_back = bool(first and second) and second[0] == [node, *first][-2]
         if visit[0] <= _length(storey, [node, *best]) <= visit[1] and not turns_back:
             break
-    return best or [int(rng.choice(_neighbours(storey, node)))]
-
-
-def _neighbours(storey: Storey, node: int) -> list[int]:
-    return [int(e.sum() - node) for e in storey.edges if node in e]
+    if best:
+        return best
+    edge = int(rng.choice(np.flatnonzero(np.any(storey.edges == node, axis=1))))  # to one side
+    return [int(storey.edges[edge].sum() - node)]
 
 
 def _length(storey: Storey, nodes: list[int]) -> float:
@@ -158,18 +157,18 @@ def _length(storey: Storey, nodes: list[int]) -> float:
 
 def _shortest(storey: Storey, start: int, goal: int) -> list[int]:
     """Nodes of the shortest way, the start left out."""
+    around: dict[int, list[tuple[int, float]]] = {}
+    lengths = np.hypot(*(storey.nodes[storey.edges[:, 1]] - storey.nodes[storey.edges[:, 0]]).T)
+    for (a, b), length in zip(storey.edges.tolist(), lengths.tolist(), strict=True):
+        around.setdefault(a, []).append((b, length))
+        around.setdefault(b, []).append((a, length))
     queue: list[tuple[float, int, int]] = [(0.0, start, -1)]
     came: dict[int, int] = {}
-    while queue:
+    while queue and goal not in came:
         far, node, before = heapq.heappop(queue)
-        if node in came:
-            continue
-        came[node] = before
-        if node == goal:
-            break
-        for other in _neighbours(storey, node):
-            if other not in came:
-                gap = float(np.hypot(*(storey.nodes[other] - storey.nodes[node])))
+        if node not in came:
+            came[node] = before
+            for other, gap in around[node]:
                 heapq.heappush(queue, (far + gap, other, node))
     way = [goal]
     while came[way[-1]] >= 0:
