@@ -5,8 +5,8 @@ Pieces for one floor only are joined with what they overlap: on their own floor 
 on the next floor above or below, where a stairwell or a shaft continues. Whatever is left serves one floor: it
 leads nowhere, is no connector, and is noted as such.
 
-A landing lies where the piece opens: before the door in its edge, else before the longest stretch of its edge
-without wall, else (an edge that is mostly open) in its middle.
+A landing lies where the piece opens to its floor: before the widest door in its edge, else before the longest stretch
+of its edge without wall, else (it is mostly open, or opens to nothing walkable) in its middle.
 """
 
 from __future__ import annotations
@@ -39,6 +39,7 @@ WALL_NEAR = 0.15  # m, an edge with a wall this near is closed
 NARROWEST = 0.4  # m, a shorter gap in the walls of a piece is no way in
 MOSTLY = 0.5  # of the edge without wall: the piece is open, and has no entrance
 BEFORE = 0.4  # m, a landing lies this far before the door
+CLEAR = 0.2  # m, from the walls: no landing in the slit between two of them
 SEARCHED = 1.5  # m, from a landing that is not walkable to a place that is
 
 
@@ -173,22 +174,24 @@ def _landing(floor: Floor, index: int, group: list[Piece]) -> Landing:
 
 
 def _entrance(floor: Floor, shape: Any) -> tuple[float, float]:
-    """Where a piece opens: see the module's words."""
+    """Where a piece opens to the rest of its floor: see the module's words."""
     import shapely
 
     edge = shape.boundary
-    middle = shape.representative_point()
     doors: Any = shapely.linestrings(_near(floor.doors, shape).reshape(-1, 2, 2))
-    near = [door for door in doors if door.distance(edge) <= WALL_NEAR + 0.1]
-    if near:
-        widest = max(near, key=lambda door: float(door.length))
-        return _before(floor, shape, widest)
     walls = shapely.linestrings(_near(floor.walls, shape).reshape(-1, 2, 2))
     bare = edge.difference(shapely.union_all(walls).buffer(WALL_NEAR))
     gaps = [part for part in shapely.get_parts(shapely.line_merge(bare)) if part.length >= NARROWEST]
-    if not gaps or bare.length > MOSTLY * edge.length:
-        return float(middle.x), float(middle.y)
-    return _before(floor, shape, max(gaps, key=lambda part: float(part.length)))
+    ways = sorted((door for door in doors if door.distance(edge) <= WALL_NEAR + 0.1), key=_shortness)
+    if bare.length <= MOSTLY * edge.length:
+        ways += sorted(gaps, key=_shortness)
+    places = (_before(floor, shape, way) for way in ways)
+    middle = shape.representative_point()
+    return next((place for place in places if place is not None), (float(middle.x), float(middle.y)))
+
+
+def _shortness(line: Any) -> float:
+    return -float(line.length)
 
 
 def _near(segments: Array, shape: Any) -> Array:
@@ -199,8 +202,8 @@ def _near(segments: Array, shape: Any) -> Array:
     return np.asarray(segments[np.all((low <= (x1, y1)) & (high >= (x0, y0)), axis=1)])
 
 
-def _before(floor: Floor, shape: Any, gap: Any) -> tuple[float, float]:
-    """Walkable place before the middle of a gap outside a piece, else in the gap."""
+def _before(floor: Floor, shape: Any, gap: Any) -> tuple[float, float] | None:
+    """Walkable place before the middle of a gap outside a piece; None where there is none (it leads out)."""
     import shapely
 
     at = gap.interpolate(0.5, normalized=True)
@@ -209,10 +212,11 @@ def _before(floor: Floor, shape: Any, gap: Any) -> tuple[float, float]:
     outside = shapely.distance(shape, shapely.points(around))
     walkable = floor.walkable.contains(around[:, 0], around[:, 1])
     crossing = floor.wall_index.crosses(at.x, at.y, around[:, 0], around[:, 1])
-    free = np.where(walkable & ~crossing, outside, -1.0)
+    walls: Any = shapely.linestrings(_near(floor.walls, shape).reshape(-1, 2, 2))
+    clear = shapely.distance(shapely.union_all(walls), shapely.points(around)) if len(walls) else np.inf
+    free = np.where(walkable & ~crossing & (clear > CLEAR), outside, 0.0)
     best = int(np.argmax(free))
-    x, y = around[best] if free[best] > 0.0 else (at.x, at.y)
-    return float(x), float(y)
+    return (float(around[best, 0]), float(around[best, 1])) if free[best] > 0.5 * BEFORE else None
 
 
 def _nearest_walkable(floor: Floor, x: float, y: float) -> tuple[float, float]:
