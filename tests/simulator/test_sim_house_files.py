@@ -150,7 +150,7 @@ def test_a_way_into_stairs_and_lift_is_walkable_on_the_imported_plan(tmp_path, s
 @pytest.fixture(scope="module")
 def small() -> Scenario:
     return replace(
-        house_scenario(), survey_walks=3, test_walks=1, duration_s=(8.0, 10.0), changes=1, visit_m=(3.0, 12.0)
+        house_scenario(), survey_walks=1, test_walks=1, duration_s=(8.0, 10.0), changes=1, visit_m=(3.0, 12.0)
     )
 
 

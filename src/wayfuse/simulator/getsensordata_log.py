@@ -85,8 +85,11 @@ def _angles(q: Array) -> Array:
 
 
 def _wifi_lines(recording: Recording, ssid: Mapping[int, str]) -> Iterator[tuple[float, str]]:
+    networks: dict[int, str] = {}
     for scan in recording.wifi:
         columns = (scan.bssid.tolist(), scan.rssi.tolist(), scan.frequency.tolist(), scan.last_seen.tolist())
         for bssid, rssi, frequency, seen in zip(*columns, strict=True):
-            network = f"{ssid.get(bssid, '')};{bssid_text(bssid)}"
+            network = networks.get(bssid)
+            if network is None:
+                network = networks[bssid] = f"{ssid.get(bssid, '')};{bssid_text(bssid)}"
             yield scan.t, f"WIFI;{scan.t:.4f};{_BOOT + seen:.4f};{network};{frequency};{rssi:.0f}"
