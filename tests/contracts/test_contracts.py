@@ -27,6 +27,7 @@ from wayfuse.presets.methods import build_method
 from wayfuse.radio.sparse_knn import SparseKnn
 from wayfuse.radio.survey import Fingerprint
 from wayfuse.tracking.dead_reckoning import Start
+from wayfuse.tracking.engine import Known
 from wayfuse.tracking.estimate import Estimate, State
 
 N = 64
@@ -72,7 +73,7 @@ def cloud(world: Any, n: int = N) -> Cloud:
     xy = world.survey.xy[rows] + rng.normal(0.0, 1.5, (n, 2))
     bias, scale = rng.normal(0.0, 0.2, n), rng.normal(1.0, 0.1, n)
     columns = (a.astype(np.float32) for a in (xy[:, 0], xy[:, 1], bias, scale))
-    return Cloud(*columns, world.survey.floor[rows].astype(np.int32))
+    return Cloud.on_floors(*columns, world.survey.floor[rows].astype(np.int32))
 
 
 def fingerprint(world: Any) -> Fingerprint:
@@ -94,7 +95,7 @@ def same(found: Any, kept: list[np.ndarray]) -> None:
 def is_cloud(c: Cloud, n: int = N) -> None:
     for name, column in c._asdict().items():
         assert column.shape == (n,)
-        assert column.dtype == (np.int32 if name == "floor" else np.float32)
+        assert column.dtype == (np.int32 if name in ("floor", "connector", "departure") else np.float32)
         assert np.all(np.isfinite(column))
 
 
@@ -209,15 +210,15 @@ def test_engine_keeps_its_states(world: Any, method: Any) -> None:
     state = engine.init("x", 1)
     step = StepEvent(0.0, 0.7, 0.3, 0.5, 2.0, -2.0, 1.0, 0.0, 1.0)
     for k in range(3):
-        state = engine.on_fingerprint(state, 2.0 * k, fingerprint(world), heading_known=True)
-        state = engine.on_step(state, step, heading_known=True)
+        state = engine.on_fingerprint(state, 2.0 * k, fingerprint(world), Known())
+        state = engine.on_step(state, step)
 
     def onward() -> list[Estimate]:
         after, out = state, []
         for k in range(4):
-            after = engine.on_step(after, step, heading_known=True)
+            after = engine.on_step(after, step)
             after = engine.on_quiet(after, 0.5)
-            after = engine.on_fingerprint(after, 7.0 + k, fingerprint(world), heading_known=False)
+            after = engine.on_fingerprint(after, 7.0 + k, fingerprint(world), Known(heading=False))
             after, e = engine.estimate(after, 7.0 + k)
             out.append(e)
         return out

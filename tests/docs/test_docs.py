@@ -193,7 +193,7 @@ def test_the_radio_map_skeleton_comes_back_from_a_file(
 
 def _cloud(n: int) -> Cloud:
     ones = np.ones(n, np.float32)
-    return Cloud(3 * ones, 4 * ones, 0 * ones, 1.1 * ones, np.arange(n, dtype=np.int32) % 2)
+    return Cloud.on_floors(3 * ones, 4 * ones, 0 * ones, 1.1 * ones, np.arange(n, dtype=np.int32) % 2)
 
 
 def test_the_motion_skeleton_keeps_the_contract_of_motion_models() -> None:
@@ -329,5 +329,5 @@ def test_the_python_example_of_the_readme_runs(
     monkeypatch.chdir(tmp_path)
     exec(compile(example, "README.md", "exec"), {"__name__": "readme"})  # noqa: S102
     assert re.search(
-        r"^-?\d+\.\d m, -?\d+\.\d m, F\d, within \d+\.\d m$", capsys.readouterr().out, re.MULTILINE
+        r"^-?\d+\.\d m, -?\d+\.\d m, F?\d, within \d+\.\d m$", capsys.readouterr().out, re.MULTILINE
     )

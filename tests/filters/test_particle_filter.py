@@ -57,7 +57,7 @@ def start(x: Array) -> FilterState:
     n = len(x)
     column = x.astype(np.float32)
     zero = np.zeros(n, np.float32)
-    return FilterState(Cloud(column, zero, zero, zero + 1, np.zeros(n, np.int32)), np.zeros(n), 0)
+    return FilterState(Cloud.on_floors(column, zero, zero, zero + 1, np.zeros(n, np.int32)), np.zeros(n), 0)
 
 
 @pytest.mark.parametrize("scheme", RESAMPLERS)
@@ -145,7 +145,7 @@ def test_the_past_follows_the_ancestors() -> None:
     lone = np.array([-99.0, -99.0, 0.0, -99.0])
     after, _ = ParticleFilter().update(KEY, state, lone)
     np.testing.assert_array_equal(after.history[0].x, 12.0)
-    fresh = Cloud(*(np.float32([70.0]) for _ in range(4)), np.int32([1]))
+    fresh = Cloud.on_floors(*(np.float32([70.0]) for _ in range(4)), np.int32([1]))
     replaced = replace_particles(after, np.array([1]), fresh)
     np.testing.assert_array_equal(replaced.cloud.x, [2, 70, 2, 2])
     np.testing.assert_array_equal(replaced.history[0].x, [12, 70, 12, 12])

@@ -31,7 +31,8 @@ def floors() -> tuple[Floor, ...]:
 def clouds(floor: np.ndarray, start: np.ndarray, stop: np.ndarray) -> tuple[Cloud, Cloud]:
     zero = np.zeros(len(floor), np.float32)
     before, after = (
-        Cloud(*p.astype(np.float32).T.copy(), zero, zero + 1, floor.astype(np.int32)) for p in (start, stop)
+        Cloud.on_floors(*p.astype(np.float32).T.copy(), zero, zero + 1, floor.astype(np.int32))
+        for p in (start, stop)
     )
     return before, after
 

@@ -23,7 +23,7 @@ def cloud(n: int = 200) -> Cloud:
     rng = np.random.default_rng(2)
     x, y = rng.uniform(-10.0, 45.0, (2, n)).astype(np.float32)
     zero = np.zeros(n, np.float32)
-    return Cloud(x, y, zero, zero + 1, rng.integers(0, 2, n).astype(np.int32))
+    return Cloud.on_floors(x, y, zero, zero + 1, rng.integers(0, 2, n).astype(np.int32))
 
 
 def twin(model: FingerprintLikelihood, c: Cloud, near: Neighbours) -> np.ndarray:

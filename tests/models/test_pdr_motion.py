@@ -17,7 +17,9 @@ EXACT = {"length_sigma": 0.0, "heading_sigma": 0.0, "bias_sigma": 0.0, "scale_si
 def cloud(n: int = 500, seed: int = 1) -> Cloud:
     rng = np.random.default_rng(seed)
     x, y, bias = (rng.normal(0.0, s, n).astype(np.float32) for s in (10.0, 10.0, 0.2))
-    return Cloud(x, y, bias, rng.normal(1, 0.1, n).astype(np.float32), rng.integers(0, 3, n).astype(np.int32))
+    return Cloud.on_floors(
+        x, y, bias, rng.normal(1, 0.1, n).astype(np.float32), rng.integers(0, 3, n).astype(np.int32)
+    )
 
 
 def test_a_step_without_noise_is_plain_dead_reckoning() -> None:
@@ -47,7 +49,7 @@ def test_the_kernel_is_its_twin() -> None:
 def test_noise_has_the_spread_of_its_parameters() -> None:
     n = 50_000
     zero = np.zeros(n, np.float32)
-    before = Cloud(zero, zero, zero, zero + 1, np.zeros(n, np.int32))
+    before = Cloud.on_floors(zero, zero, zero, zero + 1, np.zeros(n, np.int32))
     motion = PdrMotion(length_sigma=0.1, heading_sigma=0.02, bias_sigma=0.03, scale_sigma=0.0)
     after = motion.propagate(Noise.of(3, "spread"), before, StepInput(1.0, 0.0))
     relative = 5.0 / np.sqrt(2.0 * n)
@@ -59,7 +61,7 @@ def test_noise_has_the_spread_of_its_parameters() -> None:
 def test_diffusion_grows_with_the_root_of_time() -> None:
     n = 50_000
     zero = np.zeros(n, np.float32)
-    before = Cloud(zero, zero, zero, zero + 1, np.zeros(n, np.int32))
+    before = Cloud.on_floors(zero, zero, zero, zero + 1, np.zeros(n, np.int32))
     walk = RandomWalk(1.5)
     at_once = walk.propagate(Noise.of(0, "a"), before, 4.0)
     noise, stepwise = Noise.of(0, "b"), before

@@ -32,11 +32,11 @@ def query(seed: int = 0, m: int = 30) -> Fingerprint:
 
 def twin(survey: Survey, q: Fingerprint, *, idf: bool, bands: tuple[tuple[int, int], ...] = ()) -> np.ndarray:
     def represent(rssi: np.ndarray) -> np.ndarray:
-        return np.nan_to_num(np.clip((rssi + 100.0) / 70.0, 0.0, None)) ** 1.6
+        return np.nan_to_num(np.clip((rssi + 100.0) / 70.0, 0.0, None)) ** 2.2
 
     dense = survey.dense().astype(np.float64)
     heard = np.isfinite(dense).sum(axis=0)
-    weight = np.maximum(np.log(len(survey) / np.maximum(heard, 1)), 1e-3) if idf else np.ones(len(heard))
+    weight = 2.0 + np.log(len(survey) / np.maximum(heard, 1)) if idf else np.ones(len(heard))
     if bands:
         weight = weight * np.any([(survey.frequency >= a) & (survey.frequency < b) for a, b in bands], axis=0)
     v, u = represent(dense), represent(survey.vector(q).astype(np.float64))

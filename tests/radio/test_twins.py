@@ -63,7 +63,7 @@ def test_shared_weights_make_a_radio_count_once() -> None:
     assert near is not None
     assert near.distance < 1e-5
     # by hand: one value per radio, the mean over its networks of min and of sums
-    value = (np.clip((s.dense() + 100.0) / 70.0, 0, None) ** 1.6) * twin_shares(s)
+    value = (np.clip((s.dense() + 100.0) / 70.0, 0, None) ** 2.2) * twin_shares(s)
     expected = 1.0 - 2.0 * np.minimum(value, value[3]).sum(1) / (value.sum(1) + value[3].sum())
     np.testing.assert_allclose(shared.distances(query)[0], expected, atol=2e-6)
     assert not np.allclose(plain.distances(query)[0], expected, atol=1e-3)

@@ -16,6 +16,7 @@ from wayfuse.presets import baselines, fused
 from wayfuse.radio.sparse_knn import SparseKnn
 from wayfuse.sensors.records import Acceleration, MagneticField
 from wayfuse.tracking.dead_reckoning import DeadReckoning, Start
+from wayfuse.tracking.engine import Known
 from wayfuse.tracking.estimate import State
 from wayfuse.tracking.summary import Summary, summarise
 
@@ -30,7 +31,7 @@ def test_dead_reckoning_adds_up_steps() -> None:
     engine = DeadReckoning(start=Start(10.0, 5.0, 1), rotation=0.5)
     state = engine.init("x", 0)
     for heading in (0.5, 0.5 + np.pi / 2, 0.5 + np.pi):
-        state = engine.on_step(state, step(0.8, heading), heading_known=True)
+        state = engine.on_step(state, step(0.8, heading))
     state, e = engine.estimate(state, 3.0)
     assert (e.x, e.y, e.floor, e.n_steps) == (pytest.approx(10.0), pytest.approx(5.8), 1, 3)
     assert e.state is State.TRACKING
@@ -156,16 +157,16 @@ def test_without_motion_sensors_fused_moves_like_the_random_walk(world: Any) -> 
     assert fingerprint is not None
 
     def after(engine: Any, *, quiet: bool) -> Any:
-        state = engine.on_fingerprint(engine.init("x", 0), scan.t, fingerprint, heading_known=True)
+        state = engine.on_fingerprint(engine.init("x", 0), scan.t, fingerprint, Known())
         if quiet:
             state = engine.on_quiet(state, 1.0)
             assert state.is_quiet
         else:
-            state = engine.on_step(state, step(0.7, 0.3), heading_known=True)
+            state = engine.on_step(state, step(0.7, 0.3))
             assert not state.is_quiet
-        return engine.on_fingerprint(state, scan.t + 1.0, fingerprint, heading_known=True)
+        return engine.on_fingerprint(state, scan.t + 1.0, fingerprint, Known())
 
     assert after(sharp, quiet=True).ess < after(engine, quiet=True).ess < 1.0
     assert after(sharp, quiet=False).ess == after(engine, quiet=False).ess
-    state = engine.on_step(after(engine, quiet=True), step(0.7, 0.3), heading_known=True)
+    state = engine.on_step(after(engine, quiet=True), step(0.7, 0.3))
     assert not state.is_quiet  # the first step ends it

@@ -1,4 +1,4 @@
-"""The particle cloud: float32 columns, one per component of the state."""
+"""The particle cloud: columns, one per component of the state; float32 where they are quantities."""
 
 from __future__ import annotations
 
@@ -9,14 +9,18 @@ from numpy.typing import NDArray
 
 from wayfuse.core.types import Array32
 
-__all__ = ["Cloud"]
+__all__ = ["NO_CONNECTOR", "Cloud"]
+
+NO_CONNECTOR = -1
 
 
 class Cloud(NamedTuple):
     """N particles. Nobody writes into a cloud they did not make.
 
-    x, y : (N,) m, building frame. heading_bias : (N,) rad, added to the measured heading. step_scale : (N,),
-    multiplies the measured step length. floor : (N,) index into the site's floors.
+    x, y : (N,) m, frame of the particle's floor. heading_bias : (N,) rad, added to the measured heading. step_scale :
+    (N,), multiplies the measured step length. floor : (N,) index into the site's floors; on a connector the floor it
+    is nearest. connector : (N,) index into the site's connectors for those on stairs or in a lift, `NO_CONNECTOR` for
+    those who walk a floor. departure : (N,) index of the floor the connector was entered from, else of no meaning.
     """
 
     x: Array32
@@ -24,6 +28,15 @@ class Cloud(NamedTuple):
     heading_bias: Array32
     step_scale: Array32
     floor: NDArray[np.int32]
+    connector: NDArray[np.int32]
+    departure: NDArray[np.int32]
+
+    @classmethod
+    def on_floors(
+        cls, x: Array32, y: Array32, heading_bias: Array32, step_scale: Array32, floor: NDArray[np.int32]
+    ) -> Cloud:
+        """Particles that all walk a floor."""
+        return cls(x, y, heading_bias, step_scale, floor, np.full_like(floor, NO_CONNECTOR), floor)
 
     def take(self, ancestors: NDArray[np.integer]) -> Cloud:
         """The particles at some indices, copied."""

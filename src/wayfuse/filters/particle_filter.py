@@ -12,7 +12,7 @@ References
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple, Protocol, TypeVar
+from typing import Any, NamedTuple, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -156,13 +156,10 @@ class ParticleFilter:
 
 def replace_particles(state: FilterState, slots: NDArray[np.integer], fresh: Cloud) -> FilterState:
     """Put fresh particles into slots; their past is where they are now, for they have none."""
-    cloud = Cloud(
-        _replaced(state.cloud.x, slots, fresh.x),
-        _replaced(state.cloud.y, slots, fresh.y),
-        _replaced(state.cloud.heading_bias, slots, fresh.heading_bias),
-        _replaced(state.cloud.step_scale, slots, fresh.step_scale),
-        _replaced(state.cloud.floor, slots, fresh.floor),
-    )
+    columns: list[NDArray[Any]] = [
+        _replaced(column, slots, new) for column, new in zip(state.cloud, fresh, strict=True)
+    ]
+    cloud = Cloud(*columns)
     past = tuple(
         Snapshot(
             s.t,

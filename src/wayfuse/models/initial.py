@@ -57,7 +57,7 @@ class FirstCloud:
         else:
             bias = ((noise.uniforms(n)[0] * 2.0 - 1.0) * np.pi).astype(np.float32)
         scale = np.maximum(np.float32(1.0) + np.float32(self.scale_sigma) * z[1], np.float32(0.4))
-        return Cloud(x, y, bias, scale, floor)
+        return Cloud.on_floors(x, y, bias, scale, floor)
 
     def _is_walkable(self, x: Array32, y: Array32, floor: NDArray[np.int32]) -> BoolArray:
         inside = np.zeros(len(x), dtype=bool)

@@ -67,5 +67,10 @@ def survey_walk(site: Site, recording: Recording) -> tuple[SurveyWalk | None, li
     if len(table) < 2:
         return None, [*notes, f"{where}: all waypoints at one time: nothing surveyed"]
     return SurveyWalk(
-        recording.name, table[:, 0], table[:, 1:3], table[:, 3].astype(np.int32), recording.wifi
+        recording.name,
+        table[:, 0],
+        table[:, 1:3],
+        table[:, 3].astype(np.int32),
+        recording.wifi,
+        recording.device.model,
     ), notes

@@ -22,6 +22,7 @@ RANDOM_WALK = Config(
     use_steps=False,
     map_constraint="none",
     exponent=2.0,
+    background=0.05,
     coverage_gain=0.0,
     injection=0.01,
 )

@@ -7,25 +7,31 @@ particle filter), chu2009 (floor plan as constraint), li2015 (step length per pa
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
 
-from wayfuse.core.errors import RadioMapError
+from wayfuse.core.errors import ConfigError, RadioMapError
 from wayfuse.filters.particle_filter import Constraint, ParticleFilter
 from wayfuse.filters.resampling import resampler
+from wayfuse.inertial.vertical_front_end import VerticalConfig, VerticalFrontEnd
 from wayfuse.maps.site import Site
 from wayfuse.models.constraint.barriers import Barriers
 from wayfuse.models.constraint.walkable_mask import WalkableMask
 from wayfuse.models.initial import FirstCloud
+from wayfuse.models.motion.connectors import ConnectorMotion
 from wayfuse.models.motion.pdr import PdrMotion
 from wayfuse.models.motion.random_walk import RandomWalk
 from wayfuse.models.observation.coverage import SurveyDistance
 from wayfuse.models.observation.fingerprint import FingerprintLikelihood
+from wayfuse.models.observation.neighbouring import NeighbouringFloors
+from wayfuse.radio.device_offset import DeviceOffset
 from wayfuse.radio.sparse_knn import SparseKnn
 from wayfuse.radio.survey import Survey
 from wayfuse.tracking.estimate import Estimate, State
+from wayfuse.tracking.floor_change import FloorChange
 from wayfuse.tracking.particle_engine import ParticleEngine, ParticleState, Recovery
 from wayfuse.tracking.summary import Summary
 from wayfuse.tracking.tracker import Tracker
@@ -49,22 +55,28 @@ class Config:
     k: int = 40  # neighbours of a scan
     temperature: float = 0.02  # of the neighbours' weights, in signal distance
     bands: tuple[tuple[int, int], ...] = ()  # MHz; empty = both
-    sigma: float = 4.0  # m, kernel at a neighbour
-    background: float = 0.05
+    # kernel at a neighbour: this many times the survey's own accuracy, within limits (m); `radio.survey_accuracy`
+    kernel_width: float = 1.4
+    kernel_limits: tuple[float, float] = (1.2, 6.0)
+    kernel_unknown: float = 4.0  # m, of a survey that does not know its accuracy
+    background: float = 0.025
     exponent: float = 0.45  # tempering: errors of successive scans are much alike
     coverage_gain: float = 1.5  # nats
     length_sigma: float = 0.15  # relative, per step
-    heading_sigma: float = 0.06  # rad, per step
-    bias_sigma: float = 0.015  # rad, per step
+    heading_sigma: float = 0.08  # rad, per step
+    bias_sigma: float = 0.035  # rad, per step
     scale_sigma: float = 0.006  # per step
-    first_bias_sigma: float = 0.2  # rad; rotation vector against truth: 0.17 between walks
-    first_scale_sigma: float = 0.09  # per-walk mean step against the model
-    injection: float = 0.005  # share of particles per scan
+    first_bias_sigma: float = 0.3  # rad; rotation vector against truth: 0.17 between walks
+    first_scale_sigma: float = 0.08  # per-walk mean step against the model
+    injection: float = 0.02  # share of particles per scan
     penalty: float = 1.2  # nats per blocked move
     diffusion: float = 4.0  # m per root second and axis, where motion sensors are silent
     quiet_exponent: float = 2.0  # tempering there; both as the random walk tuned for itself
     map_constraint: Literal["walkable", "barriers", "none"] = "walkable"
     use_steps: bool = True
+    device_offset: bool = True  # estimate how the phone's levels differ from the survey's
+    use_vertical: bool = True  # stairs, lifts and escalators change floors
+    use_pressure: bool = True
     summary: Summary = field(default_factory=lambda: CALIBRATED)
 
 
@@ -80,11 +92,12 @@ def build(
     c = config or Config()
     check_floors(site, survey)
     observation = FingerprintLikelihood(
-        sigma=c.sigma,
+        sigma=_kernel(survey, c),
         background=c.background,
         exponent=c.exponent,
         coverage=SurveyDistance.build(survey) if c.coverage_gain > 0.0 else None,
         coverage_gain=c.coverage_gain,
+        neighbouring=NeighbouringFloors.build(site, survey),
     )
     first = FirstCloud(
         observation=observation,
@@ -92,28 +105,48 @@ def build(
         bias_sigma=c.first_bias_sigma,
         scale_sigma=c.first_scale_sigma,
     )
+    motion = PdrMotion(
+        length_sigma=c.length_sigma,
+        heading_sigma=c.heading_sigma,
+        bias_sigma=c.bias_sigma,
+        scale_sigma=c.scale_sigma,
+    )
+    constraint, particle_filter = _constraint(site, c), ParticleFilter(resampler(c.resampling))
     engine = ParticleEngine(
         radio_map=SparseKnn(survey, k=c.k, temperature=c.temperature, bands=c.bands),
         observation=observation,
         first=first,
         prior=prior_estimate(site),
-        motion=PdrMotion(
-            length_sigma=c.length_sigma,
-            heading_sigma=c.heading_sigma,
-            bias_sigma=c.bias_sigma,
-            scale_sigma=c.scale_sigma,
-        ),
+        motion=motion,
         diffusion=RandomWalk(c.diffusion),
-        constraint=_constraint(site, c),
-        filter=ParticleFilter(resampler(c.resampling)),
+        constraint=constraint,
+        filter=particle_filter,
         recovery=Recovery(injection=c.injection),
         summary=c.summary,
         n_particles=c.n_particles,
         quiet_gain=c.quiet_exponent / c.exponent,
         uses_steps=c.use_steps,
         rotation=site.anchor.rotation if site.anchor is not None else 0.0,
+        device=DeviceOffset() if c.device_offset else None,
+        floor_change=FloorChange(
+            connectors=ConnectorMotion(site=site),
+            steps=motion,
+            filter=particle_filter,
+            constraint=constraint,
+        )
+        if c.use_vertical and len(site.floors) > 1
+        else None,
     )
-    return Tracker(engine=engine, lag=lag)
+    vertical = VerticalFrontEnd(VerticalConfig(use_pressure=c.use_pressure))
+    return Tracker(engine=engine, vertical=vertical, lag=lag)
+
+
+def _kernel(survey: Survey, c: Config) -> float:
+    if not c.kernel_width > 0.0:
+        raise ConfigError(f"kernel_width must be positive, got {c.kernel_width}", where="Config")
+    if not math.isfinite(survey.accuracy):
+        return c.kernel_unknown
+    return float(np.clip(c.kernel_width * survey.accuracy, *c.kernel_limits))
 
 
 def _constraint(site: Site, c: Config) -> Constraint | None:

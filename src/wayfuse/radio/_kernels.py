@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from wayfuse.core.jit import fast_kernel, kernel
 from wayfuse.core.types import Array32
 
-__all__ = ["accumulate_overlap", "nearest"]
+__all__ = ["accumulate_overlap", "nearest", "nearest_mean_distances"]
 
 
 @fast_kernel
@@ -52,3 +52,50 @@ def nearest(distance: Array32, k: int, index: NDArray[np.int32], best: Array32) 
         if n < k:
             n += 1
     return n
+
+
+@fast_kernel
+def nearest_mean_distances(
+    columns: NDArray[np.int64],
+    values: Array32,
+    weights: Array32,
+    start: NDArray[np.int64],
+    rows: NDArray[np.int32],
+    row_values: Array32,
+    row_sum: Array32,
+    best: Array32,
+    out: Array32,
+) -> None:
+    """Mean Sorensen distance of the k nearest rows, for S versions of a query at once.
+
+    ``values`` (A, S) of the query's access points in each version; ``best`` (S, k) is scratch; ``out`` (S,).
+    """
+    n, versions, k = row_sum.shape[0], values.shape[1], best.shape[1]
+    overlap = np.zeros((n, versions), np.float32)
+    total = np.full(versions, np.float32(1e-6))
+    for q in range(columns.shape[0]):
+        a = columns[q]
+        w = weights[q]
+        for s in range(versions):
+            total[s] += w * values[q, s]
+        for i in range(start[a], start[a + 1]):
+            u = row_values[i]
+            r = rows[i]
+            for s in range(versions):
+                v = values[q, s]
+                overlap[r, s] += w * (u if u < v else v)
+    best[:] = np.float32(1.0)
+    for r in range(n):
+        for s in range(versions):
+            d = np.float32(1.0) - np.float32(2.0) * overlap[r, s] / (row_sum[r] + total[s])
+            if d < best[s, k - 1]:
+                j = k - 1
+                while j > 0 and best[s, j - 1] > d:
+                    best[s, j] = best[s, j - 1]
+                    j -= 1
+                best[s, j] = d
+    for s in range(versions):
+        mean = np.float32(0.0)
+        for j in range(k):
+            mean += best[s, j]
+        out[s] = mean / np.float32(k)

@@ -255,7 +255,10 @@ _SURVEY_ARRAYS = {
 def survey_parts(survey: Survey) -> tuple[dict[str, Any], dict[str, NDArray[Any]]]:
     """Header and arrays of a survey, for files that hold one besides other things."""
     arrays = {name: np.asarray(getattr(survey, name), dtype) for name, dtype in _SURVEY_ARRAYS.items()}
-    return {"floors": list(survey.floors), "walks": list(survey.walks)}, arrays
+    header: dict[str, Any] = {"floors": list(survey.floors), "walks": list(survey.walks)}
+    if math.isfinite(survey.accuracy):
+        header["accuracy"] = survey.accuracy
+    return header, arrays
 
 
 def survey_from_parts(
@@ -270,7 +273,10 @@ def survey_from_parts(
         )
     parts = {name: arrays[name] for name in _SURVEY_ARRAYS}
     _check_survey(parts, len(header["floors"]), len(header["walks"]), where)
-    return Survey(**parts, floors=tuple(header["floors"]), walks=tuple(header["walks"]))
+    accuracy = header.get("accuracy", math.nan)
+    if not isinstance(accuracy, float):
+        raise RadioMapError(f"accuracy {accuracy!r} is no number", where=where, remedy=_AGAIN)
+    return Survey(**parts, floors=tuple(header["floors"]), walks=tuple(header["walks"]), accuracy=accuracy)
 
 
 def _check_survey(

@@ -4,7 +4,10 @@ The distance of a query q and a fingerprint r is Sorensen's (Bray-Curtis), each 
 it is among the fingerprints (inverse document frequency, as in text retrieval):
 
 .. math:: d(q, r) = 1 - \frac{2 \sum_a w_a \min(v_{qa}, v_{ra})}{\sum_a w_a v_{qa} + \sum_a w_a v_{ra}},
-          \quad v = \left(\frac{\max(\mathrm{rssi} - r_0, 0)}{70}\right)^{1.6}, \quad w_a = \log\frac{n}{n_a}
+          \quad v = \left(\frac{\max(\mathrm{rssi} - r_0, 0)}{70}\right)^{2.2}, \quad w_a = 2 + \log\frac{n}{n_a}
+
+The two keeps access points in the account that are heard everywhere: their levels still tell places apart, and in a
+small building there are no others.
 
 Only access points heard in both add to the overlap, so an inverted index (access point -> fingerprints that heard
 it) answers a query in a fraction of a millisecond. Use it for surveys from walks; for small static sets `knn` has
@@ -20,8 +23,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wayfuse.core.errors import ConfigError, RadioMapError
-from wayfuse.core.types import Array32
-from wayfuse.radio._kernels import accumulate_overlap, nearest
+from wayfuse.core.types import Array32, IdArray
+from wayfuse.radio._kernels import accumulate_overlap, nearest, nearest_mean_distances
 from wayfuse.radio.survey import Fingerprint, Fix, Survey
 from wayfuse.radio.twins import twin_shares
 
@@ -51,7 +54,8 @@ class SparseKnn:
     ----------
     survey : fingerprints.
     k : neighbours. temperature : of the neighbours' weights exp(-(d - d_0) / temperature).
-    rssi_floor : r_0 (dBm). exponent : of the powed representation. idf : weight by rarity.
+    rssi_floor : r_0 (dBm). exponent : of the powed representation. idf : weight by rarity; ``common`` is the weight of
+    an access point heard everywhere.
     bands : which bands to use, in MHz intervals; empty = all. share_twins : let the networks of one radio (`twins`)
     count once together; off, for it did not help on the ms-indoor development folds.
     """
@@ -60,8 +64,9 @@ class SparseKnn:
     k: int = 40
     temperature: float = 0.02
     rssi_floor: float = -100.0
-    exponent: float = 1.6
+    exponent: float = 2.2
     idf: bool = True
+    common: float = 2.0
     bands: tuple[tuple[int, int], ...] = ()
     share_twins: bool = False
     _start: NDArray[np.int64] = field(init=False, repr=False)
@@ -81,7 +86,7 @@ class SparseKnn:
         order = np.argsort(s.indices, kind="stable")
         rows = np.repeat(np.arange(n, dtype=np.int32), np.diff(s.indptr))
         values = self._represent(s.rssi)
-        rarity = np.log(n / np.maximum(heard, 1)) if self.idf else np.ones(m)
+        rarity = self.common + np.log(n / np.maximum(heard, 1)) if self.idf else np.ones(m)
         weight = np.where(self._in_bands(s.frequency), np.maximum(rarity, 1e-3), 0.0).astype(np.float32)
         if self.share_twins:
             weight = weight * twin_shares(s)
@@ -112,9 +117,11 @@ class SparseKnn:
         distance: Array32 = np.float32(1.0) - np.float32(2.0) * overlap / total
         return distance, int(np.count_nonzero(weight * value > 0.0))
 
-    def neighbours(self, fingerprint: Fingerprint) -> Neighbours | None:
-        """The k nearest; None where the survey knows no access point of the query."""
+    def neighbours(self, fingerprint: Fingerprint, without_walk: int | None = None) -> Neighbours | None:
+        """The k nearest, those of one walk left out; None where the survey knows no access point of the query."""
         distance, n_aps = self.distances(fingerprint)
+        if without_walk is not None:
+            distance[self.survey.walk == without_walk] = 1.0
         if n_aps == 0:
             return None
         index, best = np.empty(self.k, np.int32), np.empty(self.k, np.float32)
@@ -130,6 +137,31 @@ class SparseKnn:
             float(best[0]),
             n_aps,
         )
+
+    def mean_distances(self, bssid: IdArray, rssi: Array32, k: int) -> Array32 | None:
+        """Mean distance of the k nearest for versions of a query, (S,): rssi (A, S) dBm of access points (A,).
+
+        None where no access point is known. Fewer than k fingerprints count as if the missing had distance 1.
+        """
+        column = self.survey.columns(bssid)
+        known = column >= 0
+        if not np.any(known):
+            return None
+        column, value = column[known], self._represent(rssi[known])
+        out = np.empty(value.shape[1], np.float32)
+        best = np.empty((value.shape[1], k), np.float32)
+        nearest_mean_distances(
+            column,
+            value,
+            self._weight[column],
+            self._start,
+            self._rows,
+            self._values,
+            self._row_sum,
+            best,
+            out,
+        )
+        return out
 
     def locate(self, fingerprint: Fingerprint) -> Fix | None:
         """Weighted mean of the neighbours on the heaviest floor; None where no access point is known."""

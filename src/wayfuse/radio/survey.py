@@ -6,6 +6,7 @@ access points of which a place hears a hundred, so readings are stored row by ro
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -42,6 +43,8 @@ class Survey:
     bssid : (m,) identifiers, ascending. frequency : (m,) MHz, the commonest channel of each, 0 unknown.
     xy : (n, 2) m, building frame. floor : (n,) index into ``floors``. walk : (n,) index into ``walks``.
     indptr : (n + 1,), indices : (k,) column of each reading, rssi : (k,) dBm: the readings, row by row.
+    accuracy : m, how well its own fingerprints are found by those of other walks (`radio.survey_accuracy`), NaN where
+    nobody looked.
     """
 
     bssid: IdArray
@@ -54,6 +57,7 @@ class Survey:
     rssi: Array32
     floors: tuple[str, ...]
     walks: tuple[str, ...]
+    accuracy: float = math.nan
 
     def __post_init__(self) -> None:
         n, m = len(self.xy), len(self.bssid)
@@ -141,4 +145,5 @@ class Survey:
             rssi=self.rssi[take],
             floors=self.floors,
             walks=self.walks,
+            accuracy=self.accuracy,
         )

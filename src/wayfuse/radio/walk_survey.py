@@ -8,7 +8,7 @@ later, weighted by exp(-|dt| / ``decay``). Readings later than the moment are us
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from os import PathLike
 from typing import NamedTuple
 
@@ -18,8 +18,10 @@ from numpy.typing import NDArray
 from wayfuse.core.errors import RadioMapError
 from wayfuse.core.types import Array
 from wayfuse.radio.archive import read_archive, survey_from_parts, survey_parts, write_archive
+from wayfuse.radio.device_survey import device_shifts, normalised
 from wayfuse.radio.scans import Readings, readings
 from wayfuse.radio.survey import Survey
+from wayfuse.radio.survey_accuracy import survey_accuracy
 from wayfuse.sensors.records import WifiScan
 
 __all__ = ["SurveyParameters", "SurveyWalk", "WalkRadioMap", "load", "survey_from_walks"]
@@ -37,10 +39,13 @@ class SurveyParameters:
     after: float = 2.0  # s
     decay: float = 1.5  # s
     min_readings: int = 3  # access points; fewer say nothing about a place
+    normalise_devices: bool = True  # bring all phones to the levels of the commonest (`device_survey`)
 
 
 class SurveyWalk(NamedTuple):
     """A walk whose places are known: waypoint times (k,) s ascending, places (k, 2) m, floors (k,), and its scans.
+
+    ``device`` is the phone's model, empty where not known.
 
     Between waypoints on different floors the place is not known: nothing is taken from there.
     """
@@ -50,6 +55,7 @@ class SurveyWalk(NamedTuple):
     xy: Array
     floor: NDArray[np.int32]
     scans: tuple[WifiScan, ...]
+    device: str = ""
 
 
 def survey_from_walks(
@@ -67,6 +73,7 @@ def survey_from_walks(
     floor: list[int] = []
     owner: list[int] = []
     names: list[str] = []
+    devices: list[str] = []
     channel: dict[int, dict[int, int]] = {}
     for walk in walks:
         if len(walk.t) < 2 or not walk.scans:
@@ -74,6 +81,7 @@ def survey_from_walks(
         heard = readings(walk.scans)
         _count_channels(heard, channel)
         names.append(walk.name)
+        devices.append(walk.device)
         for t in np.arange(walk.t[0], walk.t[-1] + 1e-9, p.spacing):
             leg = min(int(np.searchsorted(walk.t, t, side="right")) - 1, len(walk.t) - 2)
             if walk.floor[leg] != walk.floor[leg + 1]:
@@ -93,7 +101,7 @@ def survey_from_walks(
             remedy="give survey recordings",
         )
     bssid = np.unique(np.concatenate([ids for ids, _ in rows]))
-    return Survey(
+    survey = Survey(
         bssid=bssid,
         frequency=np.array([_commonest(channel[int(b)]) for b in bssid], np.int32),
         xy=np.array(places),
@@ -105,6 +113,9 @@ def survey_from_walks(
         floors=floors,
         walks=tuple(names),
     )
+    if p.normalise_devices:
+        survey = normalised(survey, devices, device_shifts(survey, devices)[1])
+    return replace(survey, accuracy=survey_accuracy(survey))
 
 
 def _fingerprint(

@@ -8,8 +8,9 @@ from typing import NamedTuple
 
 from wayfuse.core.errors import UsageError
 from wayfuse.inertial.front_end import StepEvent
+from wayfuse.inertial.vertical import VerticalEvent
 from wayfuse.radio.survey import Fingerprint
-from wayfuse.tracking.engine import Why
+from wayfuse.tracking.engine import Known, Why
 from wayfuse.tracking.estimate import Estimate, State
 
 __all__ = ["DeadReckoning", "DeadReckoningState", "Start"]
@@ -47,19 +48,22 @@ class DeadReckoning:
     uses_steps: bool = True
     uses_scans: bool = False
     supports_lag: bool = False
+    uses_vertical: bool = False
 
     def init(self, track: str, seed: int) -> DeadReckoningState:
         """State at the start."""
         return DeadReckoningState(self.start.x, self.start.y)
 
-    def on_step(
-        self, state: DeadReckoningState, event: StepEvent, *, heading_known: bool
-    ) -> DeadReckoningState:
+    def on_step(self, state: DeadReckoningState, event: StepEvent) -> DeadReckoningState:
         """One step on."""
         heading = event.heading - self.rotation
         why = state.why._replace(n_steps=state.why.n_steps + 1)
         x, y = state.x + event.length * math.cos(heading), state.y + event.length * math.sin(heading)
         return DeadReckoningState(x, y, state.walked + event.length, why)
+
+    def on_vertical(self, state: DeadReckoningState, event: VerticalEvent) -> DeadReckoningState:
+        """Stairs and lifts do not move it."""
+        return state
 
     def on_quiet(self, state: DeadReckoningState, dt: float) -> DeadReckoningState:
         """Without steps nobody moves."""
@@ -70,8 +74,7 @@ class DeadReckoning:
         state: DeadReckoningState,
         t: float,
         fingerprint: Fingerprint,
-        *,
-        heading_known: bool,
+        known: Known,
     ) -> DeadReckoningState:
         """The radio is not used."""
         return state

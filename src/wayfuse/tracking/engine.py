@@ -5,10 +5,11 @@ from __future__ import annotations
 from typing import NamedTuple, Protocol, TypeVar
 
 from wayfuse.inertial.front_end import StepEvent
+from wayfuse.inertial.vertical import VerticalEvent
 from wayfuse.radio.survey import Fingerprint
 from wayfuse.tracking.estimate import Estimate, State
 
-__all__ = ["Engine", "Why", "unknown"]
+__all__ = ["Engine", "Known", "Why", "unknown"]
 
 S = TypeVar("S")
 
@@ -21,11 +22,21 @@ class Why(NamedTuple):
     share_blocked: float = 0.0
 
 
+class Known(NamedTuple):
+    """What is known of the phone when a scan comes.
+
+    heading : whether its direction is absolute. height : whether a barometer would tell a change of floor.
+    """
+
+    heading: bool = True
+    height: bool = False
+
+
 class Engine(Protocol[S]):
     """A positioning method as pure functions of its own state ``S``.
 
     ``uses_steps`` tells whether it moves on steps (else it diffuses with time); ``uses_scans`` whether it looks at
-    scans; ``supports_lag`` whether it can say later where it was.
+    scans; ``supports_lag`` whether it can say later where it was; ``uses_vertical`` whether stairs and lifts move it.
     """
 
     @property
@@ -47,15 +58,24 @@ class Engine(Protocol[S]):
         """State before the first record."""
         ...
 
-    def on_step(self, state: S, event: StepEvent, *, heading_known: bool) -> S:
+    @property
+    def uses_vertical(self) -> bool:
+        """Whether movements between floors change it."""
+        ...
+
+    def on_step(self, state: S, event: StepEvent) -> S:
         """A step was made."""
+        ...
+
+    def on_vertical(self, state: S, event: VerticalEvent) -> S:
+        """A movement between floors was reported; only asked where ``uses_vertical``."""
         ...
 
     def on_quiet(self, state: S, dt: float) -> S:
         """``dt`` seconds passed without motion sensors."""
         ...
 
-    def on_fingerprint(self, state: S, t: float, fingerprint: Fingerprint, *, heading_known: bool) -> S:
+    def on_fingerprint(self, state: S, t: float, fingerprint: Fingerprint, known: Known) -> S:
         """A scan was delivered."""
         ...
 

@@ -9,9 +9,10 @@ import numpy as np
 
 from wayfuse.core.errors import UsageError
 from wayfuse.inertial.front_end import StepEvent
+from wayfuse.inertial.vertical import VerticalEvent
 from wayfuse.radio.sparse_knn import SparseKnn, fix_of
 from wayfuse.radio.survey import Fingerprint
-from wayfuse.tracking.engine import Why, unknown
+from wayfuse.tracking.engine import Known, Why, unknown
 from wayfuse.tracking.estimate import Estimate, State
 
 __all__ = ["FixEngine", "FixState"]
@@ -41,13 +42,18 @@ class FixEngine:
     uses_steps: bool = True  # steps are counted, nothing else
     uses_scans: bool = True
     supports_lag: bool = False
+    uses_vertical: bool = False
 
     def init(self, track: str, seed: int) -> FixState:
         """State before the first record."""
         return FixState()
 
-    def on_step(self, state: FixState, event: StepEvent, *, heading_known: bool) -> FixState:
+    def on_step(self, state: FixState, event: StepEvent) -> FixState:
         """Steps do not move a fix."""
+        return state
+
+    def on_vertical(self, state: FixState, event: VerticalEvent) -> FixState:
+        """Stairs and lifts do not move it."""
         return state
 
     def on_quiet(self, state: FixState, dt: float) -> FixState:
@@ -59,8 +65,7 @@ class FixEngine:
         state: FixState,
         t: float,
         fingerprint: Fingerprint,
-        *,
-        heading_known: bool,
+        known: Known,
     ) -> FixState:
         """The new fix, where the scan holds a known access point."""
         near = self.radio_map.neighbours(fingerprint)

@@ -17,14 +17,17 @@ from wayfuse.filters.particle_filter import (
     replace_particles,
 )
 from wayfuse.inertial.front_end import StepEvent
+from wayfuse.inertial.vertical import VerticalEvent
 from wayfuse.models.initial import FirstCloud
 from wayfuse.models.motion.pdr import PdrMotion, StepInput
 from wayfuse.models.motion.random_walk import RandomWalk
 from wayfuse.models.observation.fingerprint import FingerprintLikelihood
+from wayfuse.radio.device_offset import DeviceOffset, OffsetState, shifted
 from wayfuse.radio.sparse_knn import Neighbours, SparseKnn
 from wayfuse.radio.survey import Fingerprint
-from wayfuse.tracking.engine import Why, unknown
+from wayfuse.tracking.engine import Known, Why, unknown
 from wayfuse.tracking.estimate import Estimate, State
+from wayfuse.tracking.floor_change import FloorChange, Movement
 from wayfuse.tracking.summary import Summary, on_walkable, summarise
 
 __all__ = ["ParticleEngine", "ParticleState", "Recovery"]
@@ -64,6 +67,8 @@ class ParticleState(NamedTuple):
     ess: float = 1.0
     marks: tuple[float, ...] = ()
     is_quiet: bool = False
+    offset: OffsetState | None = None
+    movement: Movement = Movement()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -76,6 +81,8 @@ class ParticleEngine:
     diffusion : motion while no motion sensor speaks; ``quiet_gain`` multiplies the log-likelihood of a scan then, for
     without steps the cloud forgets fast and the scan before says little. uses_steps : False = diffusion always.
     rotation : rad, heading of building +x from east (headings arrive counter-clockwise from east).
+    device : estimates how the phone's levels differ from the survey's, None = not at all. floor_change : takes the
+    cloud over stairs and lifts, None = floors change by scans only.
     """
 
     radio_map: SparseKnn
@@ -92,6 +99,8 @@ class ParticleEngine:
     uses_steps: bool = True
     quiet_gain: float = 1.0
     rotation: float = 0.0
+    device: DeviceOffset | None = None
+    floor_change: FloorChange | None = None
     uses_scans: bool = True
     supports_lag: bool = True
 
@@ -103,16 +112,32 @@ class ParticleEngine:
 
     def init(self, track: str, seed: int) -> ParticleState:
         """State before the first record."""
-        return ParticleState(track_key(seed, track))
+        offset = None if self.device is None else self.device.init()
+        return ParticleState(track_key(seed, track), offset=offset)
 
-    def on_step(self, state: ParticleState, event: StepEvent, *, heading_known: bool) -> ParticleState:
+    @property
+    def uses_vertical(self) -> bool:
+        """Whether movements between floors change it."""
+        return self.floor_change is not None
+
+    def on_step(self, state: ParticleState, event: StepEvent) -> ParticleState:
         """Move by a step; before the first scan there is nothing to move."""
         if not self.uses_steps or state.filter is None:
             return state
         why = state.why._replace(n_steps=state.why.n_steps + 1)
         step = StepInput(event.length, event.heading - self.rotation)
         after, n_blocked = self.filter.predict(state.key, state.filter, self.motion, step, self.constraint)
+        if self.floor_change is not None:
+            after = self.floor_change.hold(state.filter, after)
+            state = state._replace(movement=self.floor_change.remember(state.movement, event.t, step))
         return self._moved(state, after, n_blocked, why)._replace(is_quiet=False)
+
+    def on_vertical(self, state: ParticleState, event: VerticalEvent) -> ParticleState:
+        """Take the cloud over stairs or by lift; before the first scan there is nothing to take."""
+        if self.floor_change is None or state.filter is None:
+            return state
+        after, movement = self.floor_change.report(state.key, state.filter, state.movement, event)
+        return state._replace(filter=after, movement=movement)
 
     def on_quiet(self, state: ParticleState, dt: float) -> ParticleState:
         """Diffuse, unconstrained: a second's displacement is no step, and walls would only trap it."""
@@ -122,21 +147,21 @@ class ParticleEngine:
         return self._moved(state, after, 0, state.why)._replace(is_quiet=True)
 
     def on_fingerprint(
-        self,
-        state: ParticleState,
-        t: float,
-        fingerprint: Fingerprint,
-        *,
-        heading_known: bool,
+        self, state: ParticleState, t: float, fingerprint: Fingerprint, known: Known
     ) -> ParticleState:
         """Weigh by a scan; the first one makes the cloud. A scan of unknown access points changes nothing."""
+        offset = state.offset
+        if self.device is not None and offset is not None:
+            offset = self.device.step(offset, self.radio_map, fingerprint)
+            fingerprint = shifted(fingerprint, self.device.shift(offset))
         near = self.radio_map.neighbours(fingerprint)
         if near is None:
             return state
+        state = state._replace(offset=offset)
         why = state.why._replace(n_aps=max(state.why.n_aps, near.n_aps))
         if state.filter is None:
             noise = Noise(state.key)
-            cloud = self.first.draw(noise, near, self.n_particles, heading_known=heading_known)
+            cloud = self.first.draw(noise, near, self.n_particles, heading_known=known.heading)
             fresh = FilterState(cloud, np.zeros(self.n_particles), noise.draw)
             return state._replace(filter=fresh, why=why)
         log_likelihood = np.zeros(self.n_particles)
@@ -144,13 +169,13 @@ class ParticleEngine:
         agreement = self.observation.agreement(state.filter.weights, log_likelihood, near)
         if state.is_quiet:
             log_likelihood *= self.quiet_gain
-        inject = self.recovery.injection > 0.0
+        is_moving = state.movement.event is not None  # nobody is drawn afresh onto stairs or into a lift
+        inject = self.recovery.injection > 0.0 and not is_moving
         after, info = self.filter.update(state.key, state.filter, log_likelihood, always_resample=inject)
-        contradictions = state.contradictions + 1 if agreement < self.recovery.agreement else 0
-        share = self.recovery.injection
-        if contradictions and contradictions % self.recovery.patience == 0:
-            share = self.recovery.reset_share
-        after = self._inject(state.key, after, near, share, heading_known)
+        contradicts = agreement < self.recovery.agreement and not is_moving
+        contradictions = state.contradictions + 1 if contradicts else 0
+        if not is_moving:
+            after = self._renewed(state.key, after, near, contradictions, known)
         ess = info.ess / self.n_particles
         return state._replace(filter=after, why=why, contradictions=contradictions, ess=ess)
 
@@ -186,17 +211,25 @@ class ParticleEngine:
         blocked = why._replace(share_blocked=why.share_blocked + n_blocked / self.n_particles)
         return state._replace(filter=after, why=blocked, n_moves=state.n_moves + 1)
 
-    def _inject(
-        self, key: tuple[int, int], state: FilterState, near: Neighbours, share: float, heading_known: bool
+    def _renewed(
+        self, key: tuple[int, int], state: FilterState, near: Neighbours, contradictions: int, known: Known
     ) -> FilterState:
+        """Some particles drawn afresh: a few always, many where the scans have long contradicted the cloud."""
+        rounds, rest = divmod(contradictions, self.recovery.patience)
+        is_reset = rounds > 0 and rest == 0
+        share = self.recovery.reset_share if is_reset else self.recovery.injection
         n = round(share * self.n_particles)
         if n == 0:
             return state
         noise = Noise(key, state.draw)
-        fresh = self.first.draw(noise, near, n, heading_known=heading_known)
+        fresh = self.first.draw(noise, near, n, heading_known=known.heading)
         # distinct slots: a random start and an even stride over the resampled (hence equally weighted) particles
         start = noise.uniforms(1)[0, 0] * self.n_particles
         slots = (np.floor(start + np.arange(n) * (self.n_particles / n)).astype(np.int64)) % self.n_particles
+        if known.height and self.floor_change is not None and not (is_reset and rounds > 1):
+            # a barometer saw no change of floor: the place is the scan's, the floor stays
+            floor = state.cloud.floor[slots]
+            fresh = fresh._replace(floor=floor, departure=floor)
         return replace_particles(state._replace(draw=noise.draw), slots, fresh)
 
     def _say(self, state: ParticleState, t: float, where: Snapshot) -> tuple[ParticleState, Estimate]:

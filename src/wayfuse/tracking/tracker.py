@@ -10,6 +10,7 @@ Bad records never stop a track: they get a `Verdict` and are counted.
 
 from __future__ import annotations
 
+import heapq
 import math
 from collections import Counter
 from dataclasses import dataclass, field, replace
@@ -20,6 +21,8 @@ import numpy as np
 from wayfuse.core.errors import ConfigError, UsageError
 from wayfuse.core.types import Array
 from wayfuse.inertial.front_end import FrontEndState, InertialFrontEnd, StepEvent
+from wayfuse.inertial.vertical import VerticalEvent
+from wayfuse.inertial.vertical_front_end import VerticalFrontEnd, VerticalState
 from wayfuse.radio.scans import ScanBuffer, ScanState
 from wayfuse.sensors.quality import Verdict
 from wayfuse.sensors.recording import Recording
@@ -27,19 +30,20 @@ from wayfuse.sensors.records import (
     Acceleration,
     MagneticField,
     Orientation,
+    Pressure,
     Record,
     RotationRate,
     Waypoint,
     WifiScan,
 )
-from wayfuse.tracking.engine import Engine
+from wayfuse.tracking.engine import Engine, Known
 from wayfuse.tracking.estimate import Estimate
 
 __all__ = ["Track", "TrackState", "Tracker"]
 
 S = TypeVar("S")
 
-_MOTION = (Acceleration, RotationRate, MagneticField, Orientation)
+_MOTION = (Acceleration, RotationRate, MagneticField, Orientation, Pressure)
 _QUIET_AFTER = 2.0  # s without motion sensors until a method diffuses (a standing phone still reports)
 _LONGEST_GAP = 300.0  # s; after a longer silence the track starts anew: the person can be anywhere
 _FAR = 1e12  # s; times beyond are no times: float64 no longer tells milliseconds apart
@@ -51,6 +55,7 @@ class TrackState(NamedTuple, Generic[S]):
     name: str
     seed: int
     front_end: FrontEndState
+    vertical: VerticalState
     scans: ScanState
     engine: S
     now: float = -np.inf
@@ -85,12 +90,14 @@ class Tracker(Generic[S]):
 
     Parameters
     ----------
-    engine : the positioning method. front_end, scan_buffer : motion records to steps, scans to fingerprints.
+    engine : the positioning method. front_end, vertical, scan_buffer : motion records to steps, motion records and
+    pressure to movements between floors, scans to fingerprints.
     interval : s, longest time between estimates. lag : s, estimates are given this much later and better.
     """
 
     engine: Engine[S]
     front_end: InertialFrontEnd = field(default_factory=InertialFrontEnd)
+    vertical: VerticalFrontEnd = field(default_factory=VerticalFrontEnd)
     scan_buffer: ScanBuffer = field(default_factory=ScanBuffer)
     interval: float = 1.0
     lag: float = 0.0
@@ -106,7 +113,12 @@ class Tracker(Generic[S]):
     def init(self, name: str, seed: int = 0) -> TrackState[S]:
         """State before the first record of a track; equal names and seeds give equal bits."""
         return TrackState(
-            name, seed, self.front_end.init(), self.scan_buffer.init(), self.engine.init(name, seed)
+            name,
+            seed,
+            self.front_end.init(),
+            self.vertical.init(),
+            self.scan_buffer.init(),
+            self.engine.init(name, seed),
         )
 
     def step(self, state: TrackState[S], record: Record) -> tuple[TrackState[S], list[Estimate], Verdict]:
@@ -131,14 +143,29 @@ class Tracker(Generic[S]):
             state, verdict = self._scan(state, record, out)
             return state, out, verdict
         if not isinstance(record, _MOTION):
-            return state, out, Verdict.IGNORED  # ranges, BLE, pressure: no model yet
+            return state, out, Verdict.IGNORED  # ranges, BLE: no model yet
         front_end, event = self.front_end.step(state.front_end, record)
         state = state._replace(front_end=front_end)
         if isinstance(record, Acceleration):
             state = state._replace(last_motion=record.t)
         if event is not None:
             state = self._step_event(state, event, out)
+        if self.engine.uses_vertical:
+            state = self._vertical(state, record, event, out)
         return state, out, Verdict.USED
+
+    def _vertical(
+        self, state: TrackState[S], record: Record, step: StepEvent | None, out: list[Estimate]
+    ) -> TrackState[S]:
+        vertical, said = self.vertical.step(state.vertical, record)
+        state = state._replace(vertical=vertical)
+        if said is not None:
+            state = self._vertical_event(state, said, out)
+        if step is None:
+            return state
+        vertical, said = self.vertical.on_step(state.vertical, step)
+        state = state._replace(vertical=vertical)
+        return state if said is None else self._vertical_event(state, said, out)
 
     def flush(self, state: TrackState[S], until: float) -> tuple[TrackState[S], list[Estimate]]:
         """The estimates still due up to a time, and those that wait for their lag."""
@@ -193,10 +220,20 @@ class Tracker(Generic[S]):
         # whether the heading is absolute matters at scans only, so the state at the end of the stretch will do
         front_end, steps = self.front_end.run(state.front_end, recording, *within)
         state = state._replace(front_end=front_end)
-        for row in zip(*(column.tolist() for column in steps), strict=True):
-            event = StepEvent(*row)
+        vertical: list[VerticalEvent] = []
+        if self.engine.uses_vertical:
+            after, vertical = self.vertical.run(state.vertical, recording, steps, *within)
+            state = state._replace(vertical=after)
+        feet: list[StepEvent | VerticalEvent] = [
+            StepEvent(*row) for row in zip(*(column.tolist() for column in steps), strict=True)
+        ]
+        # in time order, a step before what is reported at its time
+        for event in heapq.merge(feet, vertical, key=_time):
             state = self._advance(state, event.t, out, replay)
-            state = self._step_event(state, event, out)
+            if isinstance(event, StepEvent):
+                state = self._step_event(state, event, out)
+            else:
+                state = self._vertical_event(state, event, out)
         return state
 
     def _advance(
@@ -225,7 +262,9 @@ class Tracker(Generic[S]):
         """After a long silence the person can be anywhere: finish what was, begin anew under a name of its own."""
         state = self._finish(state, state.now, out, None)
         fresh = self.init(f"{state.name}@{t:.3f}", state.seed)
-        return fresh._replace(front_end=state.front_end, now=t, next_output=t, diffused=t, last_heard=t)
+        return fresh._replace(
+            front_end=state.front_end, vertical=state.vertical, now=t, next_output=t, diffused=t, last_heard=t
+        )
 
     @staticmethod
     def _heard(state: TrackState[S], t: float, replay: _Replay | None) -> TrackState[S]:
@@ -235,6 +274,11 @@ class Tracker(Generic[S]):
         self, state: TrackState[S], until: float, out: list[Estimate], replay: _Replay | None
     ) -> TrackState[S]:
         state = self._pass(state, np.nextafter(until, np.inf), out, replay)
+        if self.engine.uses_vertical and math.isfinite(until):
+            vertical, said = self.vertical.flush(state.vertical, until)
+            state = state._replace(vertical=vertical)
+            if said is not None:
+                state = self._vertical_event(state, said, out)
         while state.pending:
             state = self._recall(state, out)
         return state
@@ -242,7 +286,15 @@ class Tracker(Generic[S]):
     def _step_event(self, state: TrackState[S], event: StepEvent, out: list[Estimate]) -> TrackState[S]:
         if not (math.isfinite(event.length) and math.isfinite(event.heading)):  # sensors gone mad
             return state
-        engine = self.engine.on_step(state.engine, event, heading_known=state.front_end.is_heading_absolute)
+        engine = self.engine.on_step(state.engine, event)
+        if engine is state.engine:
+            return state
+        return self._output(state._replace(engine=engine), event.t, out)
+
+    def _vertical_event(
+        self, state: TrackState[S], event: VerticalEvent, out: list[Estimate]
+    ) -> TrackState[S]:
+        engine = self.engine.on_vertical(state.engine, event)
         if engine is state.engine:
             return state
         return self._output(state._replace(engine=engine), event.t, out)
@@ -254,9 +306,11 @@ class Tracker(Generic[S]):
         repeated = scans is state.scans
         state = self._diffuse(state._replace(scans=scans), scan.t)
         if fingerprint is not None:
-            known = state.front_end.is_heading_absolute
+            known = Known(
+                state.front_end.is_heading_absolute, math.isfinite(self.vertical.altitude(state.vertical))
+            )
             before = state.engine
-            engine = self.engine.on_fingerprint(before, scan.t, fingerprint, heading_known=known)
+            engine = self.engine.on_fingerprint(before, scan.t, fingerprint, known)
             state = state._replace(engine=engine)
             verdict = Verdict.USED if engine is not before else Verdict.UNKNOWN_ACCESS_POINTS
             if not self.engine.uses_scans:
@@ -284,6 +338,10 @@ class Tracker(Generic[S]):
         engine, estimate = self.engine.recall(state.engine)
         out.append(estimate)
         return state._replace(engine=engine, pending=state.pending[1:])
+
+
+def _time(event: StepEvent | VerticalEvent) -> float:
+    return event.t
 
 
 def _has_breaks(recording: Recording) -> bool:

@@ -65,4 +65,4 @@ class PdrMotion:
             bias,
             scale,
         )
-        return Cloud(x, y, bias, scale, cloud.floor)
+        return cloud._replace(x=x, y=y, heading_bias=bias, step_scale=scale)

@@ -20,6 +20,7 @@ from wayfuse.core.types import Array, Array32
 from wayfuse.filters.cloud import Cloud
 from wayfuse.models._kernels import mixture_log_likelihood
 from wayfuse.models.observation.coverage import SurveyDistance
+from wayfuse.models.observation.neighbouring import NeighbouringFloors
 from wayfuse.radio.sparse_knn import Neighbours
 
 __all__ = ["FingerprintLikelihood"]
@@ -32,7 +33,8 @@ class FingerprintLikelihood:
     sigma : m, kernel width at a signal distance up to ``near``; it grows by ``sigma_slope`` m per unit beyond, up to
     ``sigma_most``. background : epsilon. exponent : gamma. coverage : distance to the survey, None = no coverage term.
     coverage_gain : nats for particles farther than ``coverage_reach`` m from the survey, reached when the signal
-    distance has grown from ``coverage_from`` by ``coverage_width``.
+    distance has grown from ``coverage_from`` by ``coverage_width``. neighbouring : lends fingerprints to floors
+    without a survey, None = nobody is found there.
     """
 
     sigma: float = 4.0
@@ -46,6 +48,7 @@ class FingerprintLikelihood:
     coverage_from: float = 0.25
     coverage_width: float = 0.25
     coverage_reach: float = 5.0
+    neighbouring: NeighbouringFloors | None = None
 
     def __post_init__(self) -> None:
         for name in ("sigma", "sigma_most", "background", "exponent", "coverage_width"):
@@ -93,6 +96,8 @@ class FingerprintLikelihood:
     def _mixture(
         self, x: Array32, y: Array32, floor: NDArray[np.int32], near: Neighbours, out: Array
     ) -> None:
+        if self.neighbouring is not None:
+            near = self.neighbouring.lend(near)
         mixture_log_likelihood(
             x,
             y,

@@ -1,0 +1,45 @@
+"""How accurate a survey makes a fix, by the survey itself: each walk is found by the others.
+
+A filter has to know how far the fingerprints nearest in signal lie from the truth. It depends on the building, on the
+density of the walks and on the number of access points, so it is measured where it is used: some fingerprints of every
+walk are located by those of all other walks (nearest neighbours as in `sparse_knn`), and the *lower quartile* of the
+errors is kept. Not the median: bad fixes are the filter's background, the width of a kernel is that of good ones.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from wayfuse.core.types import Array
+from wayfuse.radio.sparse_knn import SparseKnn, fix_of
+from wayfuse.radio.survey import Fingerprint, Survey
+
+__all__ = ["held_out_errors", "survey_accuracy"]
+
+_LEAST = 20  # held-out fixes below which nothing is said
+
+
+def survey_accuracy(survey: Survey, n: int = 300) -> float:
+    """Lower quartile of `held_out_errors` (m); NaN with fewer than two walks, or too little in common."""
+    errors = held_out_errors(survey, n)
+    return float(np.quantile(errors, 0.25)) if len(errors) >= _LEAST else float("nan")
+
+
+def held_out_errors(survey: Survey, n: int = 300) -> Array:
+    """Errors (m) of about n fingerprints, evenly spread, by the walks they are not of; wrong floors count infinite."""
+    if len(survey.walks) < 2 or not len(survey):
+        return np.empty(0)
+    radio_map = SparseKnn(survey)
+    errors = []
+    for row in np.unique(np.linspace(0, len(survey) - 1, n).astype(np.int64)).tolist():
+        part = slice(int(survey.indptr[row]), int(survey.indptr[row + 1]))
+        columns = survey.indices[part]
+        query = Fingerprint(survey.bssid[columns], survey.rssi[part], survey.frequency[columns])
+        near = radio_map.neighbours(query, without_walk=int(survey.walk[row]))
+        if near is None:
+            continue
+        fix = fix_of(near, len(survey.floors))
+        x, y = survey.xy[row]
+        same = fix.floor == survey.floor[row]
+        errors.append(float(np.hypot(fix.x - x, fix.y - y)) if same else np.inf)
+    return np.array(errors)
