@@ -41,8 +41,9 @@ def floors(draw):
     drawn = np.array(draw(walls)).reshape(-1, 2, 2)
     doors = [wall[0] + (wall[1] - wall[0]) * draw(st.sampled_from([0.25, 0.5])) for wall in drawn]
     doors = [at for at in doors if draw(st.booleans())]
-    gaps = [shapely.Point(at).buffer(0.45) for at in doors]
     solid = [box(x, y, x + 0.5 * w, y + 0.5 * h) for x, y, w, h in draw(blocks)]
+    shut = to_shapely(solid).buffer(0.01)
+    gaps = [shapely.Point(at).buffer(0.45).difference(shut) for at in doors]
     outline = [box(0, 0, WIDTH, HEIGHT)]
     segments = cut_walls([*outline, *solid], list(drawn), gaps)
     return build_floor("F1", 1, outline, walls=segments, closed=solid), solid
@@ -98,7 +99,7 @@ def components(graph):
 
 
 @given(floors())
-@settings(max_examples=60)
+@settings(max_examples=25)
 def test_cells_fill_the_walkable_space_and_portals_join_them(made):
     floor, solid = made
     graph = build_graph(Site("hall", (floor,)))
@@ -113,7 +114,7 @@ def test_cells_fill_the_walkable_space_and_portals_join_them(made):
 
 
 @given(floors())
-@settings(max_examples=30)
+@settings(max_examples=15)
 def test_cells_are_joined_where_one_can_walk(made):
     """Cells of one component, and only those, lie in one part of the free space without its walls."""
     floor, solid = made
@@ -136,7 +137,7 @@ def test_cells_are_joined_where_one_can_walk(made):
 
 
 @given(floors(), st.integers(0, 2**32))
-@settings(max_examples=30)
+@settings(max_examples=15)
 def test_a_place_is_found_in_its_cell(made, seed):
     floor, _ = made
     graph = build_graph(Site("hall", (floor,)))

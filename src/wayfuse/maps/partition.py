@@ -23,6 +23,7 @@ from wayfuse.maps.site import Floor
 __all__ = ["convex_cells", "limits", "merge_triangles", "walkable_faces"]
 
 GRID = 1e-3  # m, lines are snapped to this
+FINE = 1e-4  # m, corners of slits are snapped to this: two corners nearer than rounding make no triangle
 SLIT = 2e-3  # m, half the width cut out along a wall that ends in a room
 NARROWEST = 0.1  # m, half the width of what nobody fits into: gaps between two walls drawn side by side
 JAMB = 0.3  # m, a door is drawn up to walls this near its ends
@@ -72,7 +73,7 @@ def walkable_faces(floor: Floor, lines: Array) -> list[Any]:
         inside = [tree.geometries[i] for i in tree.query(face, predicate="intersects")]
         if inside:
             slit = shapely.union_all(inside).buffer(SLIT, cap_style="square", join_style="mitre")
-            face = face.difference(slit)  # noqa: PLW2901 - the same face without its walls
+            face = face.difference(slit, grid_size=FINE)  # noqa: PLW2901 - the same face without its walls
         parts = shapely.get_parts(face)
         found += [part for part in parts if part.geom_type == "Polygon" and part.area > DEGENERATE]
     return found
