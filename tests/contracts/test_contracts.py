@@ -95,7 +95,7 @@ def same(found: Any, kept: list[np.ndarray]) -> None:
 def is_cloud(c: Cloud, n: int = N) -> None:
     for name, column in c._asdict().items():
         assert column.shape == (n,)
-        assert column.dtype == (np.int32 if name in ("floor", "connector", "departure") else np.float32)
+        assert column.dtype == (np.int32 if name in ("floor", "connector") else np.float32)
         assert np.all(np.isfinite(column))
 
 

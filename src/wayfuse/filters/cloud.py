@@ -20,7 +20,8 @@ class Cloud(NamedTuple):
     x, y : (N,) m, frame of the particle's floor. heading_bias : (N,) rad, added to the measured heading. step_scale :
     (N,), multiplies the measured step length. floor : (N,) index into the site's floors; on a connector the floor it
     is nearest. connector : (N,) index into the site's connectors for those on stairs or in a lift, `NO_CONNECTOR` for
-    those who walk a floor. departure : (N,) index of the floor the connector was entered from, else of no meaning.
+    those who walk a floor. base : (N,) m, elevation on the connector when its present movement began, or at which the
+    particle rests on it; of no meaning on a floor.
     """
 
     x: Array32
@@ -29,14 +30,15 @@ class Cloud(NamedTuple):
     step_scale: Array32
     floor: NDArray[np.int32]
     connector: NDArray[np.int32]
-    departure: NDArray[np.int32]
+    base: Array32
 
     @classmethod
     def on_floors(
         cls, x: Array32, y: Array32, heading_bias: Array32, step_scale: Array32, floor: NDArray[np.int32]
     ) -> Cloud:
         """Particles that all walk a floor."""
-        return cls(x, y, heading_bias, step_scale, floor, np.full_like(floor, NO_CONNECTOR), floor)
+        nowhere = np.full_like(floor, NO_CONNECTOR)
+        return cls(x, y, heading_bias, step_scale, floor, nowhere, np.zeros(len(floor), np.float32))
 
     def take(self, ancestors: NDArray[np.integer]) -> Cloud:
         """The particles at some indices, copied."""

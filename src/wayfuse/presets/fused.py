@@ -72,6 +72,7 @@ class Config:
     penalty: float = 1.2  # nats per blocked move
     diffusion: float = 4.0  # m per root second and axis, where motion sensors are silent
     quiet_exponent: float = 2.0  # tempering there; both as the random walk tuned for itself
+    moving_gain: float = 0.3  # of a scan's log-likelihood on stairs and in lifts
     map_constraint: Literal["walkable", "barriers", "none"] = "walkable"
     use_steps: bool = True
     device_offset: bool = True  # estimate how the phone's levels differ from the survey's
@@ -125,6 +126,7 @@ def build(
         summary=c.summary,
         n_particles=c.n_particles,
         quiet_gain=c.quiet_exponent / c.exponent,
+        moving_gain=c.moving_gain,
         uses_steps=c.use_steps,
         rotation=site.anchor.rotation if site.anchor is not None else 0.0,
         device=DeviceOffset() if c.device_offset else None,

@@ -28,7 +28,7 @@ from wayfuse.radio.survey import Fingerprint
 from wayfuse.tracking.engine import Known, Why, unknown
 from wayfuse.tracking.estimate import Estimate, State
 from wayfuse.tracking.floor_change import FloorChange, Movement
-from wayfuse.tracking.summary import Summary, on_walkable, summarise
+from wayfuse.tracking.summary import Held, Summary, on_walkable, summarise
 
 __all__ = ["ParticleEngine", "ParticleState", "Recovery"]
 
@@ -39,7 +39,8 @@ class Recovery:
 
     injection : share of particles drawn afresh at each scan. agreement : a scan contradicts the cloud when the cloud's
     mean likelihood is below this share of what the scan's own neighbours have. patience : scans in a row until the
-    track is lost and ``reset_share`` of the particles are drawn afresh. settled : m, r95 below which a track is no
+    track is lost and ``reset_share`` of the particles are drawn afresh. hold, hold_moving : share of the weight that
+    keeps the floor said before, on a floor, and on stairs or in a lift. settled : m, r95 below which a track is no
     longer initialising. lost : m, r95 above which a settled track is lost.
     """
 
@@ -47,6 +48,8 @@ class Recovery:
     agreement: float = 0.02
     patience: int = 3
     reset_share: float = 0.5
+    hold: float = 0.15
+    hold_moving: float = 0.4
     settled: float = 25.0
     lost: float = 60.0
 
@@ -69,6 +72,7 @@ class ParticleState(NamedTuple):
     is_quiet: bool = False
     offset: OffsetState | None = None
     movement: Movement = Movement()
+    said: int = -1
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -79,7 +83,9 @@ class ParticleEngine:
     ----------
     radio_map : answers scans. observation, motion, first, constraint : the models; constraint None = no map.
     diffusion : motion while no motion sensor speaks; ``quiet_gain`` multiplies the log-likelihood of a scan then, for
-    without steps the cloud forgets fast and the scan before says little. uses_steps : False = diffusion always.
+    without steps the cloud forgets fast and the scan before says little. ``moving_gain`` does so while a movement
+    between floors is under way, for the place of somebody on stairs is known to metres only. uses_steps : False =
+    diffusion always.
     rotation : rad, heading of building +x from east (headings arrive counter-clockwise from east).
     device : estimates how the phone's levels differ from the survey's, None = not at all. floor_change : takes the
     cloud over stairs and lifts, None = floors change by scans only.
@@ -98,6 +104,7 @@ class ParticleEngine:
     n_particles: int = 1000
     uses_steps: bool = True
     quiet_gain: float = 1.0
+    moving_gain: float = 1.0
     rotation: float = 0.0
     device: DeviceOffset | None = None
     floor_change: FloorChange | None = None
@@ -128,8 +135,10 @@ class ParticleEngine:
         step = StepInput(event.length, event.heading - self.rotation)
         after, n_blocked = self.filter.predict(state.key, state.filter, self.motion, step, self.constraint)
         if self.floor_change is not None:
-            after = self.floor_change.hold(state.filter, after)
-            state = state._replace(movement=self.floor_change.remember(state.movement, event.t, step))
+            after, movement = self.floor_change.step(
+                state.key, state.filter, after, state.movement, event.t, step
+            )
+            state = state._replace(movement=movement)
         return self._moved(state, after, n_blocked, why)._replace(is_quiet=False)
 
     def on_vertical(self, state: ParticleState, event: VerticalEvent) -> ParticleState:
@@ -170,6 +179,8 @@ class ParticleEngine:
         if state.is_quiet:
             log_likelihood *= self.quiet_gain
         is_moving = state.movement.event is not None  # nobody is drawn afresh onto stairs or into a lift
+        if is_moving:
+            log_likelihood *= self.moving_gain
         inject = self.recovery.injection > 0.0 and not is_moving
         after, info = self.filter.update(state.key, state.filter, log_likelihood, always_resample=inject)
         contradicts = agreement < self.recovery.agreement and not is_moving
@@ -228,18 +239,21 @@ class ParticleEngine:
         slots = (np.floor(start + np.arange(n) * (self.n_particles / n)).astype(np.int64)) % self.n_particles
         if known.height and self.floor_change is not None and not (is_reset and rounds > 1):
             # a barometer saw no change of floor: the place is the scan's, the floor stays
-            floor = state.cloud.floor[slots]
-            fresh = fresh._replace(floor=floor, departure=floor)
+            fresh = fresh._replace(floor=state.cloud.floor[slots])
         return replace_particles(state._replace(draw=noise.draw), slots, fresh)
 
     def _say(self, state: ParticleState, t: float, where: Snapshot) -> tuple[ParticleState, Estimate]:
         assert state.filter is not None  # noqa: S101 (callers checked)
-        e = summarise(where, state.filter.weights, len(self.radio_map.floors), t, self.summary)
+        held = None
+        if self.floor_change is not None and state.said >= 0:
+            is_moving = state.movement.event is not None
+            held = Held(state.said, self.recovery.hold_moving if is_moving else self.recovery.hold)
+        e = summarise(where, state.filter.weights, len(self.radio_map.floors), t, self.summary, held)
         e = on_walkable(e, where, self.first.walkable)
         is_settled = state.is_settled or e.r95 <= self.recovery.settled
         lost = state.contradictions >= self.recovery.patience or (is_settled and e.r95 > self.recovery.lost)
         label = State.LOST if lost else State.TRACKING if is_settled else State.INITIALISING
-        return self._explained(state._replace(is_settled=is_settled), e._replace(state=label))
+        return self._explained(state._replace(is_settled=is_settled, said=e.floor), e._replace(state=label))
 
     @staticmethod
     def _explained(state: ParticleState, e: Estimate) -> tuple[ParticleState, Estimate]:

@@ -8,6 +8,7 @@ map fitted on recordings with known truth (a filter that tempers its likelihoods
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -18,7 +19,7 @@ from wayfuse.filters.particle_filter import Snapshot
 from wayfuse.maps.walkable import Walkable
 from wayfuse.tracking.estimate import Estimate, State
 
-__all__ = ["Summary", "on_walkable", "summarise"]
+__all__ = ["Held", "Summary", "on_walkable", "summarise"]
 
 _SMOOTH = 0.5  # m; Weiszfeld's weights are 1 / max(distance, about this)
 
@@ -42,11 +43,22 @@ class Summary:
             raise ConfigError("median_iterations must not be negative, scales positive", where="Summary")
 
 
-def summarise(cloud: Snapshot, weights: Array, n_floors: int, t: float, how: Summary) -> Estimate:
-    """The estimate of a cloud (N,) with normalised weights (N,)."""
+class Held(NamedTuple):
+    """The floor said before, kept while at least a share of the weight is on it: nobody flickers between floors."""
+
+    floor: int
+    share: float
+
+
+def summarise(
+    cloud: Snapshot, weights: Array, n_floors: int, t: float, how: Summary, held: Held | None = None
+) -> Estimate:
+    """The estimate of a cloud (N,) with normalised weights (N,), on the heaviest floor or the one held to."""
     mass = np.empty(n_floors)
     floor_masses(cloud.floor, weights, mass)
     floor = int(np.argmax(mass))
+    if held is not None and mass[held.floor] >= held.share:
+        floor = held.floor
     x, y = geometric_median(cloud.x, cloud.y, cloud.floor, weights, floor, how.median_iterations, _SMOOTH)
     radius = np.empty_like(cloud.x)
     xx, xy, yy = scatter(cloud.x, cloud.y, cloud.floor, weights, floor, x, y, radius)
