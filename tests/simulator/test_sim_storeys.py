@@ -10,9 +10,11 @@ import pytest
 from wayfuse.inertial.vertical import Behaviour
 from wayfuse.maps.connectors import ConnectorKind
 from wayfuse.simulator.geometry import crossings, inside
+from wayfuse.simulator.house_site import site_of
 from wayfuse.simulator.journeys import Trip, draw_trips, plan_journey
 from wayfuse.simulator.passages import RISER, Activity
 from wayfuse.simulator.rides import LiftModel, ride
+from wayfuse.simulator.simulate_journey import make_house, simulate_journey
 from wayfuse.simulator.storeys import three_storeys
 
 HEIGHT = 4.42  # m
@@ -25,7 +27,7 @@ def house():
 
 @pytest.mark.parametrize("seed", range(4))
 def test_corridors_keep_off_the_walls_and_reach_every_landing(seed):
-    building = three_storeys(np.random.default_rng(seed))
+    building = three_storeys(np.random.default_rng(seed), with_escalator=seed == 3)
     for number, storey in enumerate(building.storeys):
         assert storey.is_walkable(storey.nodes).all()
         for a, b in storey.edges:
@@ -80,9 +82,7 @@ def test_ways_cross_no_wall_of_either_floor(house):
 
 
 def test_activities_are_those_the_detectors_report():
-    assert {a.name: a.value for a in Activity} == {
-        b.name: b.value for b in Behaviour if b.name != "ESCALATOR"
-    }
+    assert {a.name: a.value for a in Activity} == {b.name: b.value for b in Behaviour}
 
 
 @pytest.mark.parametrize("rise", [4.42, -4.42, 8.84, 0.5, -30.0])
@@ -185,3 +185,29 @@ def test_walkers_stay_off_rooms_and_voids(house, journeys):
 def test_a_trip_that_skips_a_landing_of_stairs_is_refused(house):
     with pytest.raises(ValueError, match="not next to each other"):
         plan_journey(house, 0, [Trip(0, 2)], np.random.default_rng(0), lifts=LiftModel())
+
+
+def test_an_escalator_carries_a_standing_rider_up_and_only_up(sim_scenario):
+    site = make_house(sim_scenario, np.random.default_rng(0), with_escalator=True)
+    (index,) = [
+        k for k, p in enumerate(site.building.passages) if p.connector.kind is ConnectorKind.ESCALATOR
+    ]
+    recording, truth = simulate_journey(
+        site, sim_scenario, np.random.default_rng(1), "up", trips=(0, [Trip(index, 1)])
+    )
+    riding = truth.t[truth.activity == Activity.ESCALATOR]
+    duration = np.hypot(8.4, HEIGHT) / sim_scenario.lift.escalator_speed
+    assert riding[-1] - riding[0] == pytest.approx(duration, abs=0.05)
+    assert not np.any((truth.contacts > riding[0] + 0.02) & (truth.contacts < riding[-1]))
+    z = truth.at(riding[[0, -1]] + (-0.5, 0.5))[:, 2]
+    assert z[1] - z[0] == pytest.approx(HEIGHT, abs=0.01)
+    assert {w.floor for w in recording.waypoints} == {"0", "1"}
+    with pytest.raises(ValueError, match="does not go"):
+        plan_journey(site.building, 1, [Trip(index, 0)], np.random.default_rng(0), lifts=LiftModel())
+    for seed in range(30):
+        floor, trips = draw_trips(site.building, 3, np.random.default_rng(seed))
+        for trip in trips:
+            assert (trip.passage, floor) != (index, 1)
+            floor = trip.floor
+    connector = next(c for c in site_of(site.building).connectors if c.id == "escalator")
+    assert (connector.direction, connector.floors) == (1, (0, 1))

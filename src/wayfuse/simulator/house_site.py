@@ -8,12 +8,19 @@ import numpy as np
 
 from wayfuse.core.types import Array
 from wayfuse.maps.build import build_floor
+from wayfuse.maps.connectors import ConnectorKind
 from wayfuse.maps.importers.imdf_write import write_archive
 from wayfuse.maps.site import Floor, Polygon, Site, Unit
 from wayfuse.simulator.building import Building, Storey
 
 __all__ = ["site_of", "write_plan"]
 
+_CATEGORY = {
+    ConnectorKind.STAIRS: "stairs",
+    ConnectorKind.LIFT: "elevator",
+    ConnectorKind.ESCALATOR: "escalator",
+    ConnectorKind.RAMP: "ramp",
+}
 _CREATED = "2020-01-01T10:00:00Z"  # no clock: the same building gives the same bytes
 
 
@@ -36,7 +43,7 @@ def _floor(building: Building, storey: Storey, number: int) -> Floor:
         Unit(
             passage.connector.id,
             passage.connector.name,
-            "elevator" if passage.is_lift else "stairs",
+            _CATEGORY[passage.connector.kind],
             _polygon(passage.footprint),
         )
         for passage in here

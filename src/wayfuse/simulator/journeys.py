@@ -53,16 +53,18 @@ def draw_trips(
             for index, passage in enumerate(building.passages)
             if passage.is_lift == by_lift and floor in passage.connector.floors
             for other in passage.connector.floors
-            if other != floor and (by_lift or _adjacent(passage, floor, other))
+            if other != floor and (by_lift or _leads(passage, floor, other))
         ]
         trips.append(choices[int(rng.integers(len(choices)))])
         floor = trips[-1].floor
     return start, trips
 
 
-def _adjacent(passage: Passage, a: int, b: int) -> bool:
-    floors = passage.connector.floors
-    return abs(floors.index(a) - floors.index(b)) == 1
+def _leads(passage: Passage, a: int, b: int) -> bool:
+    """Whether stairs or an escalator lead from floor a to b without another landing between."""
+    floors, direction = passage.connector.floors, passage.connector.direction
+    step = floors.index(b) - floors.index(a)
+    return abs(step) == 1 and step * direction >= 0
 
 
 def plan_journey(
@@ -214,6 +216,9 @@ def _through(
         enter, move = (float(rng.uniform(*lifts.doors_s)) for _ in range(2))
         inside[0] = inside[0]._replace(pause=enter, stated=floor)
         inside[1] = inside[1]._replace(pause=move, stated=trip.floor)
+    elif passage.connector.direction:
+        inside[0] = inside[0]._replace(stated=floor)
+        inside[1] = inside[1]._replace(stated=trip.floor)
     else:
         flights = [k for k, piece in enumerate(way) if piece.activity is Activity.STAIRS]
         for k in range(flights[0], flights[-1]):  # on half landings: arriving, and before the next flight

@@ -1,4 +1,4 @@
-"""Stairways and lifts as a walker meets them: what one walks, climbs or rides between two landings.
+"""Stairways, lifts and escalators as a walker meets them: what one walks, climbs or rides between two landings.
 
 `wayfuse.maps.connectors.Connector` says what a plan knows of a connector; a `Passage` adds where one puts
 one's feet inside it, in pieces (`Stretch`) that a walker turns into steps or a ride.
@@ -15,7 +15,7 @@ import numpy as np
 from wayfuse.core.types import Array
 from wayfuse.maps.connectors import Connector, ConnectorKind, Landing
 
-__all__ = ["Activity", "Passage", "Stretch", "lift", "stairway"]
+__all__ = ["Activity", "Passage", "Stretch", "escalator", "lift", "stairway"]
 
 TREAD, RISER = 0.30, 0.17  # m, depth and height of a step: what building codes take as comfortable
 
@@ -27,6 +27,7 @@ class Activity(IntEnum):
     WALKING = 1
     STAIRS = 2
     LIFT = 3
+    ESCALATOR = 4
 
 
 class Stretch(NamedTuple):
@@ -63,7 +64,8 @@ class Passage:
     def way(self, start: int, stop: int) -> tuple[Stretch, ...]:
         """Stretches from the landing on floor ``start`` to that on floor ``stop``, the first landing left out.
 
-        A stairway is climbed from one landing to the next or back; a lift goes to any floor it serves.
+        A stairway is climbed from one landing to the next or back; a lift goes to any floor it serves; an
+            escalator goes its own way only.
         """
         i, j = self.connector.floors.index(start), self.connector.floors.index(stop)
         if self.is_lift:
@@ -72,6 +74,8 @@ class Passage:
             return (inside, ride, _level(self.connector.landings[j]))
         if abs(j - i) != 1:
             raise ValueError(f"{self.connector.id}: floors {start} and {stop} are not next to each other")
+        if (j - i) * self.connector.direction < 0:
+            raise ValueError(f"{self.connector.id}: it does not go from floor {start} to floor {stop}")
         return self.ways[i] if j > i else _reverse(self.ways[j], self.connector.landings[j])
 
     def walls(self, floor: int) -> Array:
@@ -98,6 +102,19 @@ def stairway(
     heights = np.concatenate([[0.0], np.cumsum([sum(piece.rise for piece in way) for way in ways])])
     connector = Connector(ident, ConnectorKind.STAIRS, landings, counts, 0, _ring(footprint), ident)
     return Passage(connector, footprint, open_edges, ways, tuple(heights.tolist()))
+
+
+def escalator(
+    ident: str,
+    landings: tuple[Landing, Landing],
+    way: tuple[Stretch, ...],
+    footprint: Array,
+    open_edges: tuple[int, int],
+) -> Passage:
+    """An escalator up the given way."""
+    height = sum(piece.rise for piece in way)
+    connector = Connector(ident, ConnectorKind.ESCALATOR, landings, (), 1, _ring(footprint), ident)
+    return Passage(connector, footprint, open_edges, (way,), (0.0, height))
 
 
 def lift(

@@ -23,6 +23,7 @@ class LiftModel:
         2.5,
         4.5,
     )  # from standing in the cabin to the start, and from the stop to the exit
+    escalator_speed: float = 0.5  # m/s along its slope: usual
     loss_db: tuple[float, float] = (12.0, 15.0)  # of the closed cabin, at 2.4 and 5 GHz
 
 

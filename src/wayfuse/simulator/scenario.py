@@ -70,8 +70,9 @@ class Scenario:
             raise ConfigError("scanner.period_s and imu.rate_hz must be positive")
         if self.barometer.rate_hz < 0.0:
             raise ConfigError("barometer.rate_hz must not be negative", remedy="0 is a phone without one")
-        if min(self.lift.speed, self.lift.acceleration[0], self.lift.jerk) <= 0.0:
-            raise ConfigError("lift.speed, lift.acceleration and lift.jerk must be positive")
+        moved = self.lift.speed, self.lift.acceleration[0], self.lift.jerk, self.lift.escalator_speed
+        if min(moved) <= 0.0:
+            raise ConfigError("speeds, acceleration and jerk of the lift must be positive")
 
     def tracked(self) -> Scenario:
         """The scenario of the walks to track: their phone hears ``tracked_offset_db`` more than the survey's."""

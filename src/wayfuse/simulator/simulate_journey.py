@@ -76,9 +76,11 @@ class JourneyTruth:
         return np.column_stack([np.interp(t, self.t, column) for column in columns])
 
 
-def make_house(scenario: Scenario, rng: np.random.Generator) -> SimulatedSite:
-    """Draw the three-storey building of the demo."""
-    return site_in(three_storeys(rng), scenario, rng)
+def make_house(
+    scenario: Scenario, rng: np.random.Generator, *, with_escalator: bool = False
+) -> SimulatedSite:
+    """Draw the three-storey building of the demo, with an escalator where asked for."""
+    return site_in(three_storeys(rng, with_escalator=with_escalator), scenario, rng)
 
 
 def simulate_journey(

@@ -17,11 +17,12 @@ from wayfuse.core.types import Array
 from wayfuse.maps.connectors import Landing
 from wayfuse.simulator.building import Building, Room, Storey, box, corridor_graph, cuts
 from wayfuse.simulator.geometry import polygon_walls
-from wayfuse.simulator.passages import RISER, TREAD, Activity, Passage, Stretch, lift, stairway
+from wayfuse.simulator.passages import RISER, TREAD, Activity, Passage, Stretch, escalator, lift, stairway
 
 __all__ = ["three_storeys"]
 
 _WIDTH, _HEIGHT = 60.0, 36.0  # m
+_USUAL = 3  # passages without an escalator
 _STEPS = 13  # of a half flight
 _STOREY_HEIGHT = 2 * _STEPS * RISER  # m: 4.42
 _LON, _LAT = 11.0, 48.0  # degrees: a made-up place
@@ -36,11 +37,12 @@ _WAYS = "sw-s s-se se-e e-ne ne-n n-nw nw-wl wl-ws ws-sw ws-st wl-li s-p p-n"
 _STAIRS = (box(11.5, 18.1, 11.5, 14.9), 3)  # footprint and its open edge, which is the west one
 _LIFT = (box(11.5, 13.7, 17.0, 19.0), 3)
 _HALL_STAIRS = box(38.0, 47.2, 22.4, 24.1)
+_ESCALATOR = box(38.0, 47.2, 21.3, 22.4)
 
 
-def three_storeys(rng: np.random.Generator) -> Building:
-    """Draw the building of the demo."""
-    passages = (_core_stairs(), _hall_stairs(), _lift())
+def three_storeys(rng: np.random.Generator, *, with_escalator: bool = False) -> Building:
+    """Draw the building of the demo; with an escalator from the hall up to the gallery where asked for."""
+    passages = (_core_stairs(), _hall_stairs(), _lift(), *([_escalator()] if with_escalator else []))
     storeys = (_ground_floor(passages, rng), _gallery(passages, rng), _top_floor(passages, rng))
     anchor = GeoAnchor.from_origin(_LON, _LAT)
     return Building("Wayfuse Demo House", storeys, _WIDTH, _HEIGHT, anchor, passages)
@@ -80,6 +82,20 @@ def _hall_stairs() -> Passage:
     return stairway("hall stairs", landings, (way,), _HALL_STAIRS, (3, 1))
 
 
+def _escalator() -> Passage:
+    """Beside the hall's stairs, up only."""
+    x0, x1, y = 38.0, 47.2, float(_ESCALATOR[:, 1].mean())
+    walk = Activity.WALKING
+    way = (
+        Stretch(x0 + 0.4, y, walk),
+        Stretch(x1 - 0.4, y, Activity.ESCALATOR, _STOREY_HEIGHT),
+        Stretch(x1 + 0.75, y, walk),
+    )
+    return escalator(
+        "escalator", (Landing(0, x0 - 0.75, y), Landing(1, x1 + 0.75, y)), way, _ESCALATOR, (3, 1)
+    )
+
+
 def _lift() -> Passage:
     landings = tuple(Landing(k, *_WEST["li"]) for k in range(3))
     return lift("lift", landings, tuple(_STOREY_HEIGHT * k for k in range(3)), *_LIFT)
@@ -89,7 +105,10 @@ def _ground_floor(passages: tuple[Passage, ...], rng: np.random.Generator) -> St
     rooms = _outer_rooms(rng, south_gap=(28.0, 32.0)) + _west_core(rng)
     rooms += [box(a, b, 11.5, 14.5) for a, b in pairwise(cuts(32.0, 48.5, rng))]
     points = {**_RING, **_WEST, "door": (30.0, 2.0), "w": (35.0, 18.0), "hs": (37.25, 23.25)}
-    return _storey(0, rooms, [], points, f"{_WAYS} door-s p-w w-e w-hs hs-n", passages)
+    ways = f"{_WAYS} door-s p-w w-e w-hs hs-n"
+    if len(passages) > _USUAL:
+        points["es"], ways = (37.25, float(_ESCALATOR[:, 1].mean())), f"{ways} w-es"
+    return _storey(0, rooms, [], points, ways, passages)
 
 
 def _gallery(passages: tuple[Passage, ...], rng: np.random.Generator) -> Storey:
@@ -97,7 +116,9 @@ def _gallery(passages: tuple[Passage, ...], rng: np.random.Generator) -> Storey:
     rooms += [box(a, b, 11.5, 14.5) for a, b in pairwise(cuts(32.0, 48.5, rng))]
     points = {**_RING, **_WEST, "hs": (47.95, 23.25), "eh": (50.25, 23.25)}
     ways = _WAYS.replace("e-ne ", "e-eh eh-ne ") + " eh-hs"
-    return _storey(1, rooms, [box(33.5, 46.5, 14.5, 21.5)], points, ways, passages)
+    if len(passages) > _USUAL:
+        points["es"], ways = (47.95, float(_ESCALATOR[:, 1].mean())), f"{ways} es-e"
+    return _storey(1, rooms, [box(33.5, 46.5, 14.5, 21.0)], points, ways, passages)
 
 
 def _top_floor(passages: tuple[Passage, ...], rng: np.random.Generator) -> Storey:

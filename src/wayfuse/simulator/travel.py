@@ -1,7 +1,7 @@
 """A walker on a journey over floors: level ways, stairs and rides become one path in three dimensions.
 
 As on one floor (`wayfuse.simulator.walker`), foot contacts come first. On stairs every contact is one stair: its
-number is the plan's. A rider stands while the lift moves. Heights are continuous by construction.
+number is the plan's. A rider stands while the lift or escalator moves. Heights are continuous by construction.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ class _Log:
     arc: float = 0.0
     z: float = 0.0
     knots: list[tuple[float, float, float]] = field(default_factory=list)  # time, arc length, phase
-    heights: list[tuple[float, float]] = field(default_factory=list)  # time, climbed by stairs (m)
+    heights: list[tuple[float, float]] = field(default_factory=list)  # time, height but for rides (m)
     rides: list[tuple[float, Array]] = field(default_factory=list)  # start, heights ridden on the grid (m)
     contacts: list[tuple[float, float]] = field(default_factory=list)  # time, length
     bouts: list[float] = field(default_factory=list)  # start, end, start ... of walking
@@ -128,12 +128,14 @@ def _go(
         log.knots.append((log.t, log.arc, float(len(log.contacts))))
         if activity is Activity.STAIRS:
             _climb(log, leg.stretch, float(vertex[last + 1] - vertex[last]), person, model, rng)
+        elif activity is Activity.ESCALATOR:
+            _carry(log, leg.stretch, float(vertex[last + 1] - vertex[last]), lifts)
         else:
             for duration, length in steps_between(vertex, direction, first, last + 1, person, model, rng):
                 _step(log, duration, length)
         times, arcs, _ = np.array(log.knots[knot:]).T
         arrivals = np.interp(vertex[first + 1 : last + 2], arcs, times).tolist()
-        log.bouts += [began, log.t]
+        log.bouts += [] if activity is Activity.ESCALATOR else [began, log.t]
         log.arc = float(vertex[last + 1])  # steps add up to it but for rounding
         log.knots[-1] = (log.t, log.arc, log.knots[-1][2])
     log.stated += [
@@ -163,6 +165,16 @@ def _climb(
     for k in range(flight.n_steps):
         _step(log, 1.0 / (rate * (1.0 + model.rate_jitter * rng.normal())), run / flight.n_steps)
         log.heights.append((log.t, height + flight.rise * (k + 1) / flight.n_steps))
+
+
+def _carry(log: _Log, flight: Stretch, run: float, lifts: LiftModel) -> None:
+    """Standing on the moving stairs of an escalator."""
+    height = log.heights[-1][1]
+    log.heights.append((log.t, height))
+    log.t += float(np.hypot(run, flight.rise)) / lifts.escalator_speed
+    log.arc += run
+    log.knots.append((log.t, log.arc, log.knots[-1][2]))
+    log.heights.append((log.t, height + flight.rise))
 
 
 def _path(
