@@ -17,6 +17,7 @@ __all__ = ["consume", "consume_series", "finish"]
 
 REPORT_PERIOD = 1.0  # s
 SETTLED = 3.0  # s on the level after which a movement found without a barometer is over
+BELIEF_OVER = 0.75  # belief in the level that ends a movement: less is at stake than in its beginning
 BELIEF_AGREED = 0.5  # belief of the accelerations from which they support the barometer
 SPEED_SPAN = 20  # ticks over which the speed of a lift or escalator is taken: 4 s
 
@@ -29,13 +30,13 @@ def recall(v: Array, ring: int, back: int) -> float:
 
 @kernel
 def reach(v: Array) -> int:
-    """How many ticks one may look back: to the end of the last movement, at most the ring."""
-    return int(min(v[at.V_TICKS] - 1 - v[at.V_FROM], at.N_RING - 1))
+    """How many ticks one may look back: to the end of the last movement, or `N_REACH`."""
+    return int(min(v[at.V_TICKS] - 1 - v[at.V_FROM], at.N_REACH))
 
 
 @kernel
 def steps_at(v: Array, now: float, t: float) -> float:
-    """Steps counted until a time of the last 12 s."""
+    """Steps counted until a time of the last 25 s."""
     back = int(min((now - t) / at.TICK, min(at.N_RING, v[at.V_TICKS]) - 1))
     return recall(v, at.V_RING_STEPS, max(back, 0))
 
@@ -118,15 +119,20 @@ def classify(v: Array, p: Array, now: float) -> None:
 
 
 @kernel
-def is_jump(v: Array, p: Array, back: int) -> bool:
-    """Whether most of a rise came within the time that a jump takes through the running mean."""
+def gradual_rise(v: Array, p: Array, back: int) -> float:
+    """Rise over the last ticks (m, not negative) less its fastest part, made up for the time that takes.
+
+    That part is as long as a jump of the pressure takes through the running mean, so a jump counts for nothing.
+    """
     width = int(p[at.P_WINDOW]) + 2
+    if back <= width:
+        return 0.0
     rise = recall(v, at.V_RING_Z, 0) - recall(v, at.V_RING_Z, back)
     most = 0.0
-    for k in range(max(back - width, 0) + 1):
-        gained = recall(v, at.V_RING_Z, k) - recall(v, at.V_RING_Z, min(k + width, back))
+    for k in range(back - width + 1):
+        gained = recall(v, at.V_RING_Z, k) - recall(v, at.V_RING_Z, k + width)
         most = max(most, gained * np.sign(rise))
-    return bool(most > p[at.P_JUMP] * abs(rise))
+    return float((abs(rise) - most) * back / (back - width))
 
 
 @kernel
@@ -145,7 +151,8 @@ def begin_pressed(v: Array, p: Array, now: float) -> bool:
     start = 0
     while start < far and recall(v, at.V_RING_Z, start) * sign > lowest + 0.15:
         start += 1
-    if (z - recall(v, at.V_RING_Z, start)) * sign < needed or is_jump(v, p, start):
+    rise = (z - recall(v, at.V_RING_Z, start)) * sign
+    if rise < needed or gradual_rise(v, p, start) < p[at.P_GRADUAL] * needed:
         return False
     note_start(v, now, now - (start + 0.5 * p[at.P_WINDOW]) * at.TICK)
     v[at.V_LEVEL], v[at.V_SIGN], v[at.V_PRESSED] = recall(v, at.V_RING_Z, start), sign, 1.0
@@ -222,7 +229,7 @@ def is_over_unpressed(v: Array, p: Array, now: float) -> bool:
     is_known = v[b + at.B_LAST_ENDED] > v[at.V_BEGAN] and v[at.V_RISE] * v[at.V_SIGN] > 0.0
     ended = v[b + at.B_LAST_ENDED] if is_known else v[at.V_BEGAN]
     is_over = belief(v, -v[at.V_SIGN]) > p[at.P_BELIEF] or (
-        belief(v, 0.0) > p[at.P_BELIEF] and now - ended > SETTLED
+        belief(v, 0.0) > BELIEF_OVER and now - ended > SETTLED
     )
     if is_over:
         v[at.V_ENDED] = max(ended - DELAY, v[at.V_BEGAN])

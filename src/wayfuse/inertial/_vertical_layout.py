@@ -14,11 +14,14 @@ from wayfuse.core.types import Array
 ACCELERATION, ROTATION_RATE, PRESSURE, STEP = 0, 1, 2, 3
 
 TICK = 0.2  # s: records are gathered in bins of this length and judged when a bin is complete
-N_RING = 64  # bins remembered: 12.8 s, twice the time in which a rise is looked for
+N_RING = 128  # bins remembered: 25.6 s; a movement is known to be over at most 15 s after its end
+N_REACH = (
+    63  # bins in which the beginning of a rise is looked for: 12.6 s, twice `VerticalConfig.rise_window`
+)
 
 # --- parameters (meaning and source: `VerticalConfig`)
 P_USE_PRESSURE, P_STALE, P_GAP = 0, 1, 2
-P_WINDOW, P_RISE_WINDOW, P_RISE, P_JUMP = 3, 4, 5, 6
+P_WINDOW, P_RISE_WINDOW, P_RISE, P_GRADUAL = 3, 4, 5, 6
 P_END_TIME, P_END_SPEED, P_STAIR_RATE, P_LIFT_SPEED = 7, 8, 9, 10
 P_SIGMA, P_SIGMA_RELATIVE = 11, 12
 P_TILT, P_SHAKE, P_NOISE, P_BIAS, P_READING, P_OUTLIER = 13, 14, 15, 16, 17, 18

@@ -1,6 +1,25 @@
 """The vertical front end: motion records, pressure and steps in, reports of stairs, lifts and escalators out.
 
-Streaming and causal, a record or an array at a time; both ways give the same bits. Bad data never stop it.
+Streaming and causal, a record or an array at a time; both ways give the same bits, whichever of the records of
+equal time comes first. Bad data never stop it: records that are not finite or come late are left out, silence of
+`VerticalConfig.max_gap` ends a movement, a barometer that falls silent is replaced by the accelerations.
+
+With a barometer: the altitude rises by 1.5 m (0.8 m where the accelerations agree) and by two thirds of that within
+6 s, not in a jump; it is over after 3 s below 0.1 m/s. Stairs where there are steps (0.4/s), else a lift, or an
+escalator where one stepped on while it ran and it is slower than lifts are (`VerticalConfig.lift_speed`); who walks
+on an escalator is on stairs. Class and rise are revised until it is over, the sign never. Without: `vertical_speed`;
+the rise of stairs is then the count of steps. A movement without a barometer that proves none is taken back: its
+last report has rise 0.
+
+Measured by `wayfuse.evaluation.behaviours` on the 39 recordings of ipin2023-track3 (12 flights, 4 rides, 2.08 h),
+right in class and sign, false alarms per hour; seconds from beginning to first report and from end to last, median:
+
+=================== ============ ========== ============ ========== ======
+barometer           flights      rides      false alarms declared   over
+=================== ============ ========== ============ ========== ======
+yes                 12           4          0            4.9        3.8
+no                  10 (0 wrong) 4          0            3.8        4.4
+=================== ============ ========== ============ ========== ======
 
 >>> front_end = VerticalFrontEnd()
 >>> state, event = front_end.step(front_end.init(), Pressure(0.0, 1013.25))

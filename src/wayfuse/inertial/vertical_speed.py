@@ -25,8 +25,9 @@ stairs and 0.4 m/s and more of lifts. The vertical is the own one: rotation rate
 that stands: while walking the tilt is not known well enough.
 
 What it cannot do: tell a ramp from level ground (0.1 m/s), know the height of stairs well (the count of steps gives
-it, `VerticalConfig.riser`), see through shaking. A missed beginning can make the end look like a movement the other
-way; most such doubts show as a belief below the one asked for.
+it, `VerticalConfig.riser`), see through shaking, or always tell a phone that is raised by 0.3 m within a second
+while walking from a first tread. A missed beginning can make the end look like a movement the other way; most such
+doubts show as a belief below the one asked for.
 """
 
 from __future__ import annotations
