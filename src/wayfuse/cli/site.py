@@ -1,4 +1,4 @@
-"""``wayfuse site``: import a building, draw its floors."""
+"""``wayfuse site``: import a building, draw its floors, check it, find ways through it."""
 
 from __future__ import annotations
 
@@ -6,6 +6,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
+
+from wayfuse.cli.site_route import route_command
+from wayfuse.cli.site_validate import validate_command
 
 if TYPE_CHECKING:
     from wayfuse.maps.importers.report import ImportReport
@@ -27,7 +30,11 @@ IMPORTERS = {
 
 @click.group(context_settings={"help_option_names": ["-h", "--help"]})
 def site() -> None:
-    """Import and draw buildings."""
+    """Import, check and draw buildings, and find ways through them."""
+
+
+site.add_command(route_command)
+site.add_command(validate_command)
 
 
 @site.command("import")
@@ -72,9 +79,14 @@ def import_command(plan_format: str, path: Path, out: Path, overwrite: bool, as_
     "--out", type=click.Path(path_type=Path), help="Folder for the pictures (default: SITE/pictures)."
 )
 @click.option("--svg", is_flag=True, help="Write SVG instead of PNG.")
-def show_command(folder: Path, names: tuple[str, ...], out: Path | None, svg: bool) -> None:
-    """Draw each floor of SITE and print the paths of the pictures."""
+@click.option(
+    "--graph", "with_graph", is_flag=True, help="Draw the cells of the building graph and its portals."
+)
+def show_command(folder: Path, names: tuple[str, ...], out: Path | None, svg: bool, with_graph: bool) -> None:
+    """Draw each floor of SITE with its stairs and lifts, and print the paths of the pictures."""
+    from wayfuse.evaluation.plot_graph import draw_connectors, draw_graph
     from wayfuse.evaluation.plot_site import floor_figure, save_figure
+    from wayfuse.maps.graph import build_graph
     from wayfuse.maps.site import Site
     from wayfuse.maps.store import file_stems
 
@@ -83,10 +95,15 @@ def show_command(folder: Path, names: tuple[str, ...], out: Path | None, svg: bo
     target = out or folder / "pictures"
     _make_folder(target)
     stems = file_stems(loaded.floor_names)
+    graph = build_graph(loaded) if with_graph else None
     for i in chosen:
         title = f"{loaded.name}  {loaded.floors[i].name}"
         path = target / f"{stems[i]}{'.svg' if svg else '.png'}"
-        click.echo(save_figure(floor_figure(loaded.floors[i], title), path))
+        figure = floor_figure(loaded.floors[i], title)
+        if graph is not None:
+            draw_graph(figure.axes[0], graph, i)
+        draw_connectors(figure.axes[0], loaded, i)
+        click.echo(save_figure(figure, path))
 
 
 def _make_folder(folder: Path) -> None:
@@ -110,11 +127,13 @@ def _rows(built: Site, report: ImportReport) -> list[dict[str, Any]]:
             "elevation_m": floor.elevation,
             "units": len(floor.units),
             "walls": len(floor.walls),
+            "doors": len(floor.doors),
+            "connectors": sum(k in connector.floors for connector in built.connectors),
             "walkable_share": round(floor.walkable_share, 4),
             "anchor_residual_m": None if note.residual is None else round(note.residual, 4),
             "warnings": list(note.warnings),
         }
-        for floor, note in zip(built.floors, report.floors, strict=True)
+        for k, (floor, note) in enumerate(zip(built.floors, report.floors, strict=True))
     ]
 
 
@@ -126,16 +145,19 @@ def _render(built: Site, report: ImportReport, out: Path, as_json: bool) -> None
         document = {"site": built.name, "path": str(out), "floors": rows, "warnings": list(report.warnings)}
         click.echo(json.dumps(document, indent=1, ensure_ascii=False))
         return
+    heads = ("units", "walls", "doors", "connectors", "walkable")
     click.echo(
-        f"{'floor':<8}{'level':>6}{'size (m)':>17}{'units':>7}{'walls':>7}{'walkable':>10}{'anchor off':>13}"
+        f"{'floor':<8}{'level':>6}{'size (m)':>17}"
+        + "".join(f"{h:>{len(h) + 2}}" for h in heads)
+        + f"{'anchor off':>13}"
     )
     for row in rows:
         size = f"{row['width_m']:.1f} x {row['height_m']:.1f}"
         residual = row["anchor_residual_m"]
         off = "no anchor" if residual is None else f"{residual * 1000:.1f} mm"
         share = f"{100 * row['walkable_share']:.1f} %"
-        cells = f"{row['floor']:<8}{row['level']:>6}{size:>17}{row['units']:>7}{row['walls']:>7}"
-        click.echo(f"{cells}{share:>10}{off:>13}")
+        counts = "".join(f"{row[head]:>{len(head) + 2}}" for head in heads[:-1])
+        click.echo(f"{row['floor']:<8}{row['level']:>6}{size:>17}{counts}{share:>10}{off:>13}")
     for warning in report.warnings:
         click.echo(f"warning: {warning}", err=True)
     for row in rows:

@@ -2,20 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from wayfuse.core.types import Array
-from wayfuse.evaluation.plot_site import ABOVE
+from wayfuse.evaluation.plot_site import ABOVE, INK, draw_floor
 from wayfuse.maps.connectors import Connector, ConnectorKind
 from wayfuse.maps.graph import BuildingGraph
-from wayfuse.maps.site import Site
+from wayfuse.maps.route import Leg, Ride, Route
+from wayfuse.maps.site import Floor, Site
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
-__all__ = ["draw_connectors", "draw_graph", "served_floors"]
+__all__ = ["draw_connectors", "draw_graph", "route_figure", "served_floors"]
 
 CELL_EDGE = "#8fb39a"
 OPEN_PORTAL = "#5b8f6b"
@@ -32,6 +35,7 @@ SYMBOLS = {
     ConnectorKind.ESCALATOR: "D",
     ConnectorKind.RAMP: "P",
 }
+PATH = "#d1322d"
 LINE = 9.0  # pt, height of a line of a label
 LETTER = 4.0  # pt, width of a letter, about
 
@@ -53,8 +57,11 @@ def draw_graph(ax: Axes, graph: BuildingGraph, floor: int) -> None:
         )
 
 
-def draw_connectors(ax: Axes, site: Site, floor: int) -> None:
-    """Draw each connector's landing on a floor: symbol by kind, footprint where it starts, floors it serves."""
+def draw_connectors(ax: Axes, site: Site, floor: int, labelled: Collection[str] | None = None) -> None:
+    """Draw each connector's landing on a floor: symbol by kind, footprint, name and floors served.
+
+    labelled : ids of the connectors to write names and floors at; without it all.
+    """
     from matplotlib.collections import PolyCollection
 
     served = [(c, at) for c in site.connectors if (at := c.landing(floor)) is not None]
@@ -71,7 +78,41 @@ def draw_connectors(ax: Axes, site: Site, floor: int) -> None:
     )
     for c, at in served:
         ax.plot(at.x, at.y, SYMBOLS[c.kind], color=COLOURS[c.kind], ms=7, mec="white", mew=0.8, zorder=ABOVE)
-    _labels(ax, site, served_at=[(c, at.x, at.y) for c, at in served], floor=floor)
+    written = [(c, at.x, at.y) for c, at in served if labelled is None or c.id in labelled]
+    _labels(ax, site, served_at=written, floor=floor)
+
+
+def route_figure(site: Site, route: Route, title: str = "", width: float = 8.0) -> Figure:
+    """The floors of a route side by side, the lowest at the left, ``width`` inches each, with the way on each."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    legs = [part for part in route.parts if isinstance(part, Leg)]
+    used = [part.connector.id for part in route.parts if isinstance(part, Ride)]
+    shown = sorted({leg.floor for leg in legs})
+    height = max(0.55 * width, min(1.3 * width, max(width * _shape(site.floors[k]) for k in shown)))
+    figure = Figure(figsize=(width * len(shown), height), facecolor="white", layout="constrained")
+    FigureCanvasAgg(figure)
+    axes = np.ravel(figure.subplots(1, len(shown)))
+    figure.draw_without_rendering()  # settles the size of the axes, which names are fitted to
+    for ax, k in zip(axes, shown, strict=True):
+        draw_floor(ax, site.floors[k], walkable=True)
+        draw_connectors(ax, site, k, used)
+        ax.set_title(f"floor {site.floors[k].name}", loc="left", fontsize=10, color=INK, parse_math=False)
+    for number, leg in enumerate(legs):
+        ax = axes[shown.index(leg.floor)]
+        ax.plot(*leg.path.T, color=PATH, lw=2.2, solid_joinstyle="round", zorder=ABOVE + 2.0)
+        for k, symbol, is_end in ((0, "o", number == 0), (-1, "X", number == len(legs) - 1)):
+            if is_end:
+                ax.plot(*leg.path[k], symbol, color=PATH, ms=9, mec="white", zorder=ABOVE + 3.0)
+    if title:
+        text = f"{title}   {route.length:.0f} m, {route.seconds:.0f} s"
+        figure.suptitle(text, fontsize=11, color=INK, parse_math=False)
+    return figure
+
+
+def _shape(floor: Floor) -> float:
+    return floor.height / floor.width
 
 
 def _footprint(site: Site, connector: Connector, floor: int) -> Array | None:
