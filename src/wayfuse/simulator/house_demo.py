@@ -46,7 +46,7 @@ class HouseDemo:
 
 def house_scenario() -> Scenario:
     """What the demo simulates."""
-    return Scenario(survey_walks=24, test_walks=6, tracked_offset_db=(-4.0, -2.0))
+    return Scenario(survey_walks=24, test_walks=6, visit_m=(12.0, 24.0), tracked_offset_db=(-4.0, -2.0))
 
 
 def write_house_demo(folder: Path, seed: int, scenario: Scenario | None = None) -> HouseDemo:

@@ -21,6 +21,7 @@ from wayfuse.simulator.travel import Leg
 
 __all__ = ["Journey", "Trip", "draw_trips", "plan_journey", "stay"]
 
+_TURN_BACK = 15.0  # m more or less than wanted are better than to turn on the spot
 _NEAR = 0.5  # m, a node this near to a landing is the landing's
 
 
@@ -139,13 +140,17 @@ def _wander(
     """Nodes to pass after ``node``: to a place of interest, then to the goal (the place is the goal where None)."""
     storey, inner = building.storeys[floor], _inner(building, floor)
     best: list[int] = []
+    least = np.inf
     for _ in range(24):
         middle = int(rng.choice(inner))
         first = _shortest(storey, node, middle)
         second = [] if goal is None else _shortest(storey, middle, goal)
-        best = [*first, *second]
         turns_back = bool(first and second) and second[0] == [node, *first][-2]
-        if visit[0] <= _length(storey, [node, *best]) <= visit[1] and not turns_back:
+        length = _length(storey, [node, *first, *second])
+        off = max(visit[0] - length, length - visit[1], 0.0) + _TURN_BACK * turns_back
+        if off < least:
+            best, least = [*first, *second], off
+        if off == 0.0:
             break
     if best:
         return best
