@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +15,7 @@ from wayfuse.evaluation.behaviours import (
     match,
     score_behaviours,
     score_standing,
+    true_movements,
 )
 from wayfuse.formats.reading import read
 from wayfuse.inertial.front_end import InertialFrontEnd
@@ -79,6 +81,23 @@ def test_the_bars_over_all_recordings(recordings, use_pressure):
         assert score.n_signed(STAIRS) >= 10
         assert np.median(score.declared_after) <= 4.0
         assert np.median(score.over_after) <= 5.0
+
+
+@pytest.mark.slow
+def test_accelerations_alone_find_the_lifts_and_nothing_else(recordings):
+    """Without barometer and gyroscope; stairs are not looked for."""
+    found, n_false = [], 0
+    labels = ipin2023_labels(recordings)
+    for r in recordings:
+        bare = replace(r, rotation_rate=Series.empty(3), pressure=Series.empty(1))
+        truths = true_movements(r, LIFT) if labels.get(r.name) == LIFT else ()
+        scored, false = match(r.name, truths, detect(bare, VerticalConfig())[1])
+        found += scored
+        n_false += len(false)
+    assert len(found) == 4
+    assert sum(m.is_right for m in found) >= 3
+    assert not any(m.is_wrong_sign for m in found)
+    assert n_false <= 1
 
 
 @pytest.mark.slow

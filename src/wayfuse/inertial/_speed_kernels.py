@@ -21,6 +21,7 @@ REST = 11.0  # bins after shaking until the integral is trusted: its running mea
 WALKING = 1.5  # s since the last step up to which a person walks
 SHORTEST_STAIRS, SHORTEST_LIFT = 1.8, 2.4  # s: four steps; a ride of 1 m at 0.4 m/s
 LONGEST_STAIRS, LONGEST_LIFT = 20.0, 45.0  # s: 30 steps without a landing; ten floors at 1 m/s
+STANDING = 0.5  # m/s², r.m.s. of |a| - g: who stands stays below (ipin: 0.1 to 0.4), who walks is above
 LANDING = 4.0  # s, a landing between two flights
 N_SCRATCH = 3 * at.N_BRANCH
 
@@ -86,7 +87,7 @@ def integrate(v: Array, p: Array, now: float) -> float:
     last = int(v[at.V_TICKS]) - 1
     v[at.V_RING_SUM + last % at.N_RING] = v[at.V_SUM]
     has_gyro = now - v[at.V_T_GYRO] <= 0.5
-    is_blind = not has_gyro and now - v[at.V_T_STEP] <= WALKING
+    is_blind = not has_gyro and (now - v[at.V_T_STEP] <= WALKING or v[at.V_POWER] > STANDING**2)
     if v[at.V_SPIN] > p[at.P_SHAKE] ** 2 or v[at.V_SILENT] > 4.0 or is_blind:
         restart(v)
     mean = 0.0
