@@ -179,3 +179,52 @@ def test_a_real_floor_picture(ms_indoor, tmp_path):
     path.write_text(json.dumps({"floors": [entry]}))
     (floor,) = import_site(path)[0].floors
     assert floor.height == pytest.approx(info["height"], rel=0.01)
+
+
+CONNECTOR = {
+    "id": "main",
+    "kind": "stairs",
+    "landings": [{"floor": "F2", "pixel": [310, 60]}, {"floor": "F1", "pixel": [300, 50]}],
+    "n_steps": [24],
+    "footprint": [[290, 40], [330, 40], [330, 80]],
+}
+
+
+def two_floors(tmp_path, **connector):
+    picture(tmp_path / "f1.png")
+    floors = [
+        {"name": name, "image": "f1.png", "width_m": 40.0, "walls": [[[200, 0], [200, 200]]], "doors": doors}
+        for name, doors in (("F1", [[[200, 90], [200, 110]]]), ("F2", [[[100, 90], [100, 110]]]))
+    ]
+    path = tmp_path / "office.json"
+    path.write_text(json.dumps({"floors": floors, "connectors": [{**CONNECTOR, **connector}]}))
+    return path
+
+
+def test_connectors_and_doors_in_pixels(tmp_path):
+    site, report = import_site(two_floors(tmp_path))
+    (stairs,) = site.connectors
+    assert (stairs.id, stairs.kind, stairs.n_steps) == ("main", "stairs", (24,))
+    np.testing.assert_allclose(stairs.landings, [(0, 30.0, 15.0), (1, 31.0, 14.0)])
+    np.testing.assert_allclose(stairs.footprint, [(29, 16), (33, 16), (33, 12), (29, 16)])
+    np.testing.assert_allclose(site.floors[0].doors, [[20.0, 9.0, 20.0, 11.0]])
+    assert site.floors[0].wall_index.crosses([19, 19], [10, 12], [21, 21], [10, 12]).tolist() == [False, True]
+    assert len(site.floors[1].doors) == 0
+    assert report.floors[1].warnings == ("door 1: a door on no wall: it opens nothing",)
+
+
+@pytest.mark.parametrize(
+    ("changes", "named"),
+    [
+        ({"kind": "rope"}, "connector main: kind 'rope'"),
+        ({"landings": [{"floor": "F9", "pixel": [1, 1]}]}, "connector main"),
+        ({"landings": [{"floor": "F1", "pixel": [1, 1]}]}, "connector main joins floors 0"),
+        ({"landings": 3}, "connector main"),
+        ({"id": 7}, "no id"),
+    ],
+)
+def test_a_wrong_connector_is_named(tmp_path, changes, named):
+    path = two_floors(tmp_path, **changes)
+    with pytest.raises(MapError, match=named) as caught:
+        import_site(path)
+    assert str(path) in str(caught.value)

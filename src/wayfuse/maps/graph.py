@@ -28,6 +28,7 @@ from wayfuse.maps.site import Floor, Site
 
 __all__ = ["BuildingGraph", "build_graph"]
 
+AT_EDGE = 0.3  # m, a landing this far outside a cell opens into it
 ON_EDGE = 1e-6  # m, a place this far outside a cell still is in it
 
 
@@ -41,7 +42,7 @@ class BuildingGraph:
     portal_xy (p, 4) m, portal_cells (p, 2), portal_door (p,) : passable segments, the cells on both sides, and
     whether it is a door.
     landing_cell (k,), landing_connector (k,), landing_floor (k,), landing_xy (k, 2) m : the cell each landing
-    opens into, -1 where it lies in none.
+    opens into, -1 where it lies in none; one at the edge of a cell (0.3 m) is moved into it.
     connectors : of the site, as `landing_connector` counts them.
     """
 
@@ -166,7 +167,23 @@ def build_graph(site: Site) -> BuildingGraph:
     for k in range(len(site.floors)):
         rows = graph.landing_floor == k
         graph.landing_cell[rows] = graph.cell_of(k, graph.landing_xy[rows])
+    _move_into_cells(graph)
     return graph
+
+
+def _move_into_cells(graph: BuildingGraph) -> None:
+    """Move landings that lie in no cell, but at the edge of one (where stairs are drawn to end), into that cell."""
+    import shapely
+
+    for row in np.nonzero(graph.landing_cell < 0)[0]:
+        cells = np.nonzero(graph.cell_floor == graph.landing_floor[row])[0]
+        shapes = [shapely.Polygon(graph.polygon(int(i))) for i in cells]
+        at = shapely.Point(graph.landing_xy[row])
+        away = shapely.distance(shapes, at) if shapes else np.array([np.inf])
+        best = int(np.argmin(away))
+        if away[best] <= AT_EDGE:
+            graph.landing_cell[row] = cells[best]
+            graph.landing_xy[row] = shapely.get_coordinates(shapely.shortest_line(shapes[best], at))[0]
 
 
 def _units_of(floor: Floor, cells: Sequence[Array]) -> list[int]:
