@@ -56,11 +56,11 @@ class Config:
     temperature: float = 0.02  # of the neighbours' weights, in signal distance
     bands: tuple[tuple[int, int], ...] = ()  # MHz; empty = both
     # kernel at a neighbour: this many times the survey's own accuracy, within limits (m); `radio.survey_accuracy`
-    kernel_width: float = 1.4
+    kernel_width: float = 1.5
     kernel_limits: tuple[float, float] = (1.2, 6.0)
     kernel_unknown: float = 4.0  # m, of a survey that does not know its accuracy
-    background: float = 0.025
-    exponent: float = 0.45  # tempering: errors of successive scans are much alike
+    background: float = 0.03
+    exponent: float = 0.43  # tempering: errors of successive scans are much alike
     coverage_gain: float = 1.5  # nats
     length_sigma: float = 0.15  # relative, per step
     heading_sigma: float = 0.08  # rad, per step
