@@ -62,7 +62,9 @@ def walkable_faces(floor: Floor, lines: Array) -> list[Any]:
     noded = shapely.union_all([solid, *doors], grid_size=GRID)
     areas, cuts, dangles, _ = shapely.polygonize_full(list(shapely.get_parts(noded)))
     loose = shapely.union_all([*shapely.get_parts(cuts), *shapely.get_parts(dangles)])
-    loose = loose.intersection(solid.buffer(2 * GRID))  # a door that leads nowhere divides nothing
+    loose = loose.difference(
+        shapely.union_all(doors).buffer(2 * GRID)
+    )  # a door that leads nowhere divides nothing
     whole = shapely.union_all([shapely.Polygon(p.exterior, [*p.holes]) for p in floor.outline])
     shapely.prepare(whole)
     found: list[Any] = []
