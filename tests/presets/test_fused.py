@@ -67,7 +67,7 @@ def test_parts_can_be_left_out(world: Any) -> None:
     bare = build_method("fused-no-map", world.site, world.survey, n_particles=50).engine
     assert bare.n_particles == 50
     assert bare.constraint is None
-    assert bare.first.walkable == ()
+    assert bare.walkable == ()
     assert build_method("fused-no-steps", world.site, world.survey).engine.uses_steps is False
     assert CONFIGS["fused-2.4ghz"].bands == BAND_2_4
     assert CONFIGS["fused-5ghz"].bands == BAND_5
@@ -83,7 +83,7 @@ def test_every_method_of_the_command_line_can_be_built() -> None:
 def test_one_band_uses_that_band_alone(world: Any) -> None:
     scan = world.walks[0].wifi[3]
     for name, (low, high) in (("fused-2.4ghz", (2400, 2500)), ("fused-5ghz", (4900, 5925))):
-        radio_map = build_method(name, world.site, world.survey, n_particles=50).engine.radio_map
+        radio_map = build_method(name, world.site, world.survey, n_particles=50).engine.radio.radio_map
         on = (scan.frequency >= low) & (scan.frequency < high)
         assert 5 < on.sum() < len(on) - 5
         whole, alone = (

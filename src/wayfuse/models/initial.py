@@ -1,4 +1,4 @@
-"""The first cloud: places from the first scan, headings and step scales from their priors."""
+"""The first cloud: places from the first scan or a start that is told, headings and step scales from their priors."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from wayfuse.maps.walkable import Walkable
 from wayfuse.models.observation.fingerprint import FingerprintLikelihood
 from wayfuse.radio.sparse_knn import Neighbours
 
-__all__ = ["FirstCloud"]
+__all__ = ["FirstCloud", "KnownStart"]
 
 _SPARE = 4  # places drawn per particle; a quarter to a third of a floor is walkable, near the survey more
 
@@ -51,12 +51,7 @@ class FirstCloud:
             if len(chosen) < n:
                 chosen = np.concatenate([chosen, np.flatnonzero(~good)[: n - len(chosen)]])
             x, y, floor = x[chosen], y[chosen], floor[chosen]
-        z = noise.normals(n)
-        if heading_known:
-            bias = np.float32(self.bias_sigma) * z[0]
-        else:
-            bias = ((noise.uniforms(n)[0] * 2.0 - 1.0) * np.pi).astype(np.float32)
-        scale = np.maximum(np.float32(1.0) + np.float32(self.scale_sigma) * z[1], np.float32(0.4))
+        bias, scale = _gait(noise, n, self.bias_sigma, self.scale_sigma, heading_known=heading_known)
         return Cloud.on_floors(x, y, bias, scale, floor)
 
     def _is_walkable(self, x: Array32, y: Array32, floor: NDArray[np.int32]) -> BoolArray:
@@ -65,3 +60,46 @@ class FirstCloud:
             rows = floor == f
             inside[rows] = self.walkable[f].contains(x[rows], y[rows])
         return inside
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class KnownStart:
+    """Draws particles around a place that is told: a door, a desk, the first waypoint.
+
+    Parameters
+    ----------
+    x, y : m, frame of the floor. floor : index. sigma : m. heading_known : whether the phone has an absolute heading.
+    """
+
+    x: float
+    y: float
+    floor: int
+    sigma: float = 1.0
+    bias_sigma: float = 0.25
+    scale_sigma: float = 0.1
+    heading_known: bool = True
+
+    def __post_init__(self) -> None:
+        if not (self.sigma >= 0.0 and self.bias_sigma >= 0.0 and self.scale_sigma >= 0.0):
+            raise ConfigError("sigma, bias_sigma and scale_sigma must not be negative", where="KnownStart")
+
+    def draw(self, noise: Noise, n: int) -> Cloud:
+        """n particles around the place."""
+        z = noise.normals(n)
+        x = (np.float32(self.x) + np.float32(self.sigma) * z[0]).astype(np.float32)
+        y = (np.float32(self.y) + np.float32(self.sigma) * z[1]).astype(np.float32)
+        bias, scale = _gait(noise, n, self.bias_sigma, self.scale_sigma, heading_known=self.heading_known)
+        return Cloud.on_floors(x, y, bias, scale, np.full(n, self.floor, np.int32))
+
+
+def _gait(
+    noise: Noise, n: int, bias_sigma: float, scale_sigma: float, *, heading_known: bool
+) -> tuple[Array32, Array32]:
+    """Heading biases and step scales (n,) from their priors."""
+    z = noise.normals(n)
+    if heading_known:
+        bias = np.float32(bias_sigma) * z[0]
+    else:
+        bias = ((noise.uniforms(n)[0] * 2.0 - 1.0) * np.pi).astype(np.float32)
+    scale = np.maximum(np.float32(1.0) + np.float32(scale_sigma) * z[1], np.float32(0.4))
+    return bias, scale

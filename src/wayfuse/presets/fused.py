@@ -18,9 +18,10 @@ from wayfuse.filters.particle_filter import Constraint, ParticleFilter
 from wayfuse.filters.resampling import resampler
 from wayfuse.inertial.vertical_front_end import VerticalConfig, VerticalFrontEnd
 from wayfuse.maps.site import Site
+from wayfuse.maps.walkable import Walkable
 from wayfuse.models.constraint.barriers import Barriers
 from wayfuse.models.constraint.walkable_mask import WalkableMask
-from wayfuse.models.initial import FirstCloud
+from wayfuse.models.initial import FirstCloud, KnownStart
 from wayfuse.models.motion.connectors import ConnectorMotion
 from wayfuse.models.motion.pdr import PdrMotion
 from wayfuse.models.motion.random_walk import RandomWalk
@@ -30,13 +31,24 @@ from wayfuse.models.observation.neighbouring import NeighbouringFloors
 from wayfuse.radio.device_offset import DeviceOffset
 from wayfuse.radio.sparse_knn import SparseKnn
 from wayfuse.radio.survey import Survey
+from wayfuse.tracking.dead_reckoning import Start
 from wayfuse.tracking.estimate import Estimate, State
 from wayfuse.tracking.floor_change import FloorChange
 from wayfuse.tracking.particle_engine import ParticleEngine, ParticleState, Recovery
+from wayfuse.tracking.radio_parts import Radio
 from wayfuse.tracking.summary import Summary
 from wayfuse.tracking.tracker import Tracker
 
-__all__ = ["BAND_2_4", "BAND_5", "CALIBRATED", "Config", "build", "check_floors", "prior_estimate"]
+__all__ = [
+    "BAND_2_4",
+    "BAND_5",
+    "CALIBRATED",
+    "Config",
+    "build",
+    "build_from_start",
+    "check_floors",
+    "prior_estimate",
+]
 
 BAND_2_4 = ((2400, 2500),)  # MHz
 BAND_5 = ((4900, 5925),)
@@ -82,9 +94,14 @@ class Config:
 
 
 def build(
-    site: Site, survey: Survey, config: Config | None = None, *, lag: float = 0.0
+    site: Site,
+    survey: Survey,
+    config: Config | None = None,
+    *,
+    start: Start | None = None,
+    lag: float = 0.0,
 ) -> Tracker[ParticleState]:
-    """The tracker of a site and a survey of it.
+    """The tracker of a site and a survey of it; a start that is known helps until the scans do.
 
     Raises
     ------
@@ -102,10 +119,31 @@ def build(
     )
     first = FirstCloud(
         observation=observation,
-        walkable=tuple(floor.walkable for floor in site.floors) if c.map_constraint != "none" else (),
+        walkable=_walkable(site, c),
         bias_sigma=c.first_bias_sigma,
         scale_sigma=c.first_scale_sigma,
     )
+    radio = Radio(
+        radio_map=SparseKnn(survey, k=c.k, temperature=c.temperature, bands=c.bands),
+        observation=observation,
+        first=first,
+        device=DeviceOffset() if c.device_offset else None,
+        quiet_gain=c.quiet_exponent / c.exponent,
+        moving_gain=c.moving_gain,
+    )
+    return _tracker(site, c, radio, start, lag)
+
+
+def build_from_start(
+    site: Site, start: Start, config: Config | None = None, *, lag: float = 0.0
+) -> Tracker[ParticleState]:
+    """The tracker without Wi-Fi: steps, stairs and lifts from a start that is told, held to the floor plan."""
+    return _tracker(site, config or Config(), None, start, lag)
+
+
+def _tracker(
+    site: Site, c: Config, radio: Radio | None, start: Start | None, lag: float
+) -> Tracker[ParticleState]:
     motion = PdrMotion(
         length_sigma=c.length_sigma,
         heading_sigma=c.heading_sigma,
@@ -113,10 +151,24 @@ def build(
         scale_sigma=c.scale_sigma,
     )
     constraint, particle_filter = _constraint(site, c), ParticleFilter(resampler(c.resampling))
+    floor_change = FloorChange(
+        connectors=ConnectorMotion(site=site), steps=motion, filter=particle_filter, constraint=constraint
+    )
+    known = (
+        KnownStart(
+            x=start.x,
+            y=start.y,
+            floor=start.floor,
+            bias_sigma=c.first_bias_sigma,
+            scale_sigma=c.first_scale_sigma,
+        )
+        if start is not None
+        else None
+    )
     engine = ParticleEngine(
-        radio_map=SparseKnn(survey, k=c.k, temperature=c.temperature, bands=c.bands),
-        observation=observation,
-        first=first,
+        n_floors=len(site.floors),
+        radio=radio,
+        start=known,
         prior=prior_estimate(site),
         motion=motion,
         diffusion=RandomWalk(c.diffusion),
@@ -124,23 +176,18 @@ def build(
         filter=particle_filter,
         recovery=Recovery(injection=c.injection),
         summary=c.summary,
+        floor_change=floor_change if c.use_vertical and len(site.floors) > 1 else None,
+        walkable=_walkable(site, c),
         n_particles=c.n_particles,
-        quiet_gain=c.quiet_exponent / c.exponent,
-        moving_gain=c.moving_gain,
         uses_steps=c.use_steps,
         rotation=site.anchor.rotation if site.anchor is not None else 0.0,
-        device=DeviceOffset() if c.device_offset else None,
-        floor_change=FloorChange(
-            connectors=ConnectorMotion(site=site),
-            steps=motion,
-            filter=particle_filter,
-            constraint=constraint,
-        )
-        if c.use_vertical and len(site.floors) > 1
-        else None,
     )
     vertical = VerticalFrontEnd(VerticalConfig(use_pressure=c.use_pressure))
     return Tracker(engine=engine, vertical=vertical, lag=lag)
+
+
+def _walkable(site: Site, c: Config) -> tuple[Walkable, ...]:
+    return tuple(floor.walkable for floor in site.floors) if c.map_constraint != "none" else ()
 
 
 def _kernel(survey: Survey, c: Config) -> float:

@@ -18,16 +18,17 @@ from wayfuse.filters.particle_filter import (
 )
 from wayfuse.inertial.front_end import StepEvent
 from wayfuse.inertial.vertical import VerticalEvent
-from wayfuse.models.initial import FirstCloud
+from wayfuse.maps.walkable import Walkable
+from wayfuse.models.initial import KnownStart
 from wayfuse.models.motion.pdr import PdrMotion, StepInput
 from wayfuse.models.motion.random_walk import RandomWalk
-from wayfuse.models.observation.fingerprint import FingerprintLikelihood
-from wayfuse.radio.device_offset import DeviceOffset, OffsetState, shifted
-from wayfuse.radio.sparse_knn import Neighbours, SparseKnn
+from wayfuse.radio.device_offset import OffsetState
+from wayfuse.radio.sparse_knn import Neighbours
 from wayfuse.radio.survey import Fingerprint
 from wayfuse.tracking.engine import Known, Why, unknown
 from wayfuse.tracking.estimate import Estimate, State
 from wayfuse.tracking.floor_change import FloorChange, Movement
+from wayfuse.tracking.radio_parts import Radio
 from wayfuse.tracking.summary import Held, Summary, on_walkable, summarise
 
 __all__ = ["ParticleEngine", "ParticleState", "Recovery"]
@@ -81,34 +82,29 @@ class ParticleEngine:
 
     Parameters
     ----------
-    radio_map : answers scans. observation, motion, first, constraint : the models; constraint None = no map.
-    diffusion : motion while no motion sensor speaks; ``quiet_gain`` multiplies the log-likelihood of a scan then, for
-    without steps the cloud forgets fast and the scan before says little. ``moving_gain`` does so while a movement
-    between floors is under way, for the place of somebody on stairs is known to metres only. uses_steps : False =
-    diffusion always.
-    rotation : rad, heading of building +x from east (headings arrive counter-clockwise from east).
-    device : estimates how the phone's levels differ from the survey's, None = not at all. floor_change : takes the
-    cloud over stairs and lifts, None = floors change by scans only.
+    n_floors : of the site. radio : what answers scans, None = Wi-Fi is not used. start : where the track starts, None =
+    at the first scan; one of the two is needed. prior : the estimate before. motion, constraint : of steps; constraint
+    None = no map. diffusion : motion while no motion sensor speaks. floor_change : takes the cloud over stairs and
+    lifts, None = floors change by scans only. walkable : mask per floor that estimates are kept on, empty = none.
+    uses_steps : False = diffusion always. rotation : rad, heading of building +x from east (headings arrive
+    counter-clockwise from east).
     """
 
-    radio_map: SparseKnn
-    observation: FingerprintLikelihood
-    first: FirstCloud
+    n_floors: int
     prior: Estimate
     motion: PdrMotion
     diffusion: RandomWalk
+    radio: Radio | None = None
+    start: KnownStart | None = None
     constraint: Constraint | None = None
     filter: ParticleFilter = field(default_factory=ParticleFilter)
     recovery: Recovery = field(default_factory=Recovery)
     summary: Summary = field(default_factory=Summary)
+    floor_change: FloorChange | None = None
+    walkable: tuple[Walkable, ...] = ()
     n_particles: int = 1000
     uses_steps: bool = True
-    quiet_gain: float = 1.0
-    moving_gain: float = 1.0
     rotation: float = 0.0
-    device: DeviceOffset | None = None
-    floor_change: FloorChange | None = None
-    uses_scans: bool = True
     supports_lag: bool = True
 
     def __post_init__(self) -> None:
@@ -116,11 +112,28 @@ class ParticleEngine:
             raise ConfigError(
                 f"n_particles must be at least 10, got {self.n_particles}", where="ParticleEngine"
             )
+        if self.radio is None and self.start is None:
+            raise ConfigError(
+                "neither a radio map nor a start",
+                where="ParticleEngine",
+                remedy="give radio, start, or both: nobody can be found by steps alone",
+            )
 
     def init(self, track: str, seed: int) -> ParticleState:
         """State before the first record."""
-        offset = None if self.device is None else self.device.init()
-        return ParticleState(track_key(seed, track), offset=offset)
+        key = track_key(seed, track)
+        device = None if self.radio is None else self.radio.device
+        state = ParticleState(key, offset=None if device is None else device.init())
+        if self.start is None:
+            return state
+        noise = Noise(key)
+        cloud = self.start.draw(noise, self.n_particles)
+        return state._replace(filter=FilterState(cloud, np.zeros(self.n_particles), noise.draw))
+
+    @property
+    def uses_scans(self) -> bool:
+        """Whether scans change it."""
+        return self.radio is not None
 
     @property
     def uses_vertical(self) -> bool:
@@ -159,36 +172,34 @@ class ParticleEngine:
         self, state: ParticleState, t: float, fingerprint: Fingerprint, known: Known
     ) -> ParticleState:
         """Weigh by a scan; the first one makes the cloud. A scan of unknown access points changes nothing."""
-        offset = state.offset
-        if self.device is not None and offset is not None:
-            offset = self.device.step(offset, self.radio_map, fingerprint)
-            fingerprint = shifted(fingerprint, self.device.shift(offset))
-        near = self.radio_map.neighbours(fingerprint)
+        if self.radio is None:
+            return state
+        offset, near = self.radio.neighbours(state.offset, fingerprint)
         if near is None:
             return state
-        state = state._replace(offset=offset)
-        why = state.why._replace(n_aps=max(state.why.n_aps, near.n_aps))
+        state = state._replace(offset=offset, why=state.why._replace(n_aps=max(state.why.n_aps, near.n_aps)))
         if state.filter is None:
             noise = Noise(state.key)
-            cloud = self.first.draw(noise, near, self.n_particles, heading_known=known.heading)
-            fresh = FilterState(cloud, np.zeros(self.n_particles), noise.draw)
-            return state._replace(filter=fresh, why=why)
+            cloud = self.radio.first.draw(noise, near, self.n_particles, heading_known=known.heading)
+            return state._replace(filter=FilterState(cloud, np.zeros(self.n_particles), noise.draw))
+        return self._weigh(state, state.filter, self.radio, near, known)
+
+    def _weigh(
+        self, state: ParticleState, now: FilterState, radio: Radio, near: Neighbours, known: Known
+    ) -> ParticleState:
         log_likelihood = np.zeros(self.n_particles)
-        self.observation.log_likelihood(state.filter.cloud, near, log_likelihood)
-        agreement = self.observation.agreement(state.filter.weights, log_likelihood, near)
-        if state.is_quiet:
-            log_likelihood *= self.quiet_gain
+        radio.observation.log_likelihood(now.cloud, near, log_likelihood)
+        agreement = radio.observation.agreement(now.weights, log_likelihood, near)
         is_moving = state.movement.event is not None  # nobody is drawn afresh onto stairs or into a lift
-        if is_moving:
-            log_likelihood *= self.moving_gain
+        log_likelihood *= radio.gain(is_quiet=state.is_quiet, is_moving=is_moving)
         inject = self.recovery.injection > 0.0 and not is_moving
-        after, info = self.filter.update(state.key, state.filter, log_likelihood, always_resample=inject)
+        after, info = self.filter.update(state.key, now, log_likelihood, always_resample=inject)
         contradicts = agreement < self.recovery.agreement and not is_moving
         contradictions = state.contradictions + 1 if contradicts else 0
         if not is_moving:
-            after = self._renewed(state.key, after, near, contradictions, known)
+            after = self._renewed(state.key, after, radio, near, contradictions, known)
         ess = info.ess / self.n_particles
-        return state._replace(filter=after, why=why, contradictions=contradictions, ess=ess)
+        return state._replace(filter=after, contradictions=contradictions, ess=ess)
 
     def estimate(self, state: ParticleState, t: float) -> tuple[ParticleState, Estimate]:
         """Geometric median on the heaviest floor, with radii."""
@@ -223,7 +234,13 @@ class ParticleEngine:
         return state._replace(filter=after, why=blocked, n_moves=state.n_moves + 1)
 
     def _renewed(
-        self, key: tuple[int, int], state: FilterState, near: Neighbours, contradictions: int, known: Known
+        self,
+        key: tuple[int, int],
+        state: FilterState,
+        radio: Radio,
+        near: Neighbours,
+        contradictions: int,
+        known: Known,
     ) -> FilterState:
         """Some particles drawn afresh: a few always, many where the scans have long contradicted the cloud."""
         rounds, rest = divmod(contradictions, self.recovery.patience)
@@ -233,7 +250,7 @@ class ParticleEngine:
         if n == 0:
             return state
         noise = Noise(key, state.draw)
-        fresh = self.first.draw(noise, near, n, heading_known=known.heading)
+        fresh = radio.first.draw(noise, near, n, heading_known=known.heading)
         # distinct slots: a random start and an even stride over the resampled (hence equally weighted) particles
         start = noise.uniforms(1)[0, 0] * self.n_particles
         slots = (np.floor(start + np.arange(n) * (self.n_particles / n)).astype(np.int64)) % self.n_particles
@@ -248,8 +265,8 @@ class ParticleEngine:
         if self.floor_change is not None and state.said >= 0:
             is_moving = state.movement.event is not None
             held = Held(state.said, self.recovery.hold_moving if is_moving else self.recovery.hold)
-        e = summarise(where, state.filter.weights, len(self.radio_map.floors), t, self.summary, held)
-        e = on_walkable(e, where, self.first.walkable)
+        e = summarise(where, state.filter.weights, self.n_floors, t, self.summary, held)
+        e = on_walkable(e, where, self.walkable)
         is_settled = state.is_settled or e.r95 <= self.recovery.settled
         lost = state.contradictions >= self.recovery.patience or (is_settled and e.r95 > self.recovery.lost)
         label = State.LOST if lost else State.TRACKING if is_settled else State.INITIALISING

@@ -1,0 +1,47 @@
+"""What a particle filter knows of Wi-Fi: the radio map, how it is read, and how the phone differs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from wayfuse.models.initial import FirstCloud
+from wayfuse.models.observation.fingerprint import FingerprintLikelihood
+from wayfuse.radio.device_offset import DeviceOffset, OffsetState, shifted
+from wayfuse.radio.sparse_knn import Neighbours, SparseKnn
+from wayfuse.radio.survey import Fingerprint
+
+__all__ = ["Radio"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Radio:
+    """The parts that make a scan an observation.
+
+    Parameters
+    ----------
+    radio_map : finds the fingerprints like a scan. observation : how likely that is at a particle. first : draws
+    particles from a scan. device : estimates how the phone's levels differ from the survey's, None = not at all.
+    quiet_gain : multiplies the log-likelihood of a scan while no motion sensor speaks, for without steps the cloud
+    forgets fast and the scan before says little. moving_gain : the same while a movement between floors is under way,
+    for the place of somebody on stairs is known to metres only.
+    """
+
+    radio_map: SparseKnn
+    observation: FingerprintLikelihood
+    first: FirstCloud
+    device: DeviceOffset | None = None
+    quiet_gain: float = 1.0
+    moving_gain: float = 1.0
+
+    def neighbours(
+        self, offset: OffsetState | None, fingerprint: Fingerprint
+    ) -> tuple[OffsetState | None, Neighbours | None]:
+        """What is known of the phone after a scan, and the fingerprints like it; None where none is."""
+        if self.device is not None and offset is not None:
+            offset = self.device.step(offset, self.radio_map, fingerprint)
+            fingerprint = shifted(fingerprint, self.device.shift(offset))
+        return offset, self.radio_map.neighbours(fingerprint)
+
+    def gain(self, *, is_quiet: bool, is_moving: bool) -> float:
+        """Factor of a scan's log-likelihood."""
+        return (self.quiet_gain if is_quiet else 1.0) * (self.moving_gain if is_moving else 1.0)
