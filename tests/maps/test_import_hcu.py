@@ -9,8 +9,8 @@ import pytest
 
 from wayfuse.core.errors import MapError
 from wayfuse.core.frames import metres_per_degree
+from wayfuse.core.utm import utm_to_lonlat
 from wayfuse.maps.importers.hcu import import_site, level_of
-from wayfuse.maps.importers.utm import utm_to_lonlat
 
 EAST, NORTH = 566500.0, 5932800.0
 CRS = {"type": "name", "properties": {"name": "urn:ogc:def:crs:EPSG::32632"}}

@@ -11,7 +11,7 @@ from wayfuse.sensors.recording import Recording
 
 __all__ = ["FORMATS", "expand", "read", "sniff"]
 
-FORMATS = ("ms-indoor", "getsensordata", "sensor-logger")
+FORMATS = ("ms-indoor", "getsensordata", "sensor-logger", "hcu")
 _HEAD_BYTES = 1 << 16
 _MS_INDOOR = re.compile(rb"^\d{13}\tTYPE_[A-Z]", re.MULTILINE)
 _GETSENSORDATA = re.compile(
@@ -25,7 +25,7 @@ def read(path: str | Path, *, format: str | None = None, platform: str | None = 
 
     Parameters
     ----------
-    path : a log file, a Sensor Logger folder or ZIP.
+    path : a log file, a Sensor Logger folder or ZIP, a folder of HCU Hamburg.
     format : one of `FORMATS`; found from the content where not given.
     platform : ``"android"`` or ``"ios"`` for Sensor Logger files that do not say it themselves.
 
@@ -52,6 +52,10 @@ def read(path: str | Path, *, format: str | None = None, platform: str | None = 
         from wayfuse.formats import sensor_logger
 
         return sensor_logger.read(path, platform=platform)
+    if kind == "hcu":
+        from wayfuse.formats import hcu
+
+        return hcu.read(path)
     raise UsageError(f"unknown format {kind!r}", where="format", remedy=f"use one of {', '.join(FORMATS)}")
 
 
@@ -74,8 +78,8 @@ def expand(arguments: Sequence[str | Path]) -> list[Path]:
     """Paths of the recordings that arguments mean: a file, a folder (all recordings below it) or ``@FILE``.
 
     ``@FILE`` lists a path per line, relative to the current folder; blank lines and lines with ``#`` are
-    skipped. A Sensor Logger folder is itself a recording. Files of a folder that are no recordings are
-    skipped.
+    skipped. A folder of Sensor Logger or HCU Hamburg is itself a recording. Files of a folder that are no
+    recordings are skipped.
 
     Raises
     ------
@@ -137,6 +141,9 @@ def _sniff(path: Path) -> str | None:
             return "ms-indoor"
         if _GETSENSORDATA.search(head):
             return "getsensordata"
+    from wayfuse.formats import hcu
     from wayfuse.formats.sensor_logger_tables import is_recording
 
-    return "sensor-logger" if is_recording(path) else None
+    if is_recording(path):
+        return "sensor-logger"
+    return "hcu" if hcu.is_recording(path) else None

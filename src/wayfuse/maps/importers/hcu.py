@@ -23,6 +23,7 @@ import numpy as np
 from wayfuse.core.errors import MapError
 from wayfuse.core.frames import GeoAnchor
 from wayfuse.core.types import Array
+from wayfuse.core.utm import utm_to_lonlat
 from wayfuse.maps.build import build_floor, nominal_elevation
 from wayfuse.maps.connectors import ConnectorKind
 from wayfuse.maps.geometry import edges, free_space, from_shapely
@@ -30,7 +31,6 @@ from wayfuse.maps.importers.joining import KINDS, Piece, join_pieces
 from wayfuse.maps.importers.plan_file import parse_json, read_limited
 from wayfuse.maps.importers.report import FloorReport, ImportReport, Notes
 from wayfuse.maps.importers.rooms import cleaned, outline_of, to_shapely
-from wayfuse.maps.importers.utm import utm_to_lonlat
 from wayfuse.maps.problems import KEY, problems_text
 from wayfuse.maps.site import Floor, Polygon, Site, Unit
 from wayfuse.maps.walls import LARGEST
