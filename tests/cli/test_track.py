@@ -141,7 +141,7 @@ def test_dead_reckoning_starts_where_it_is_told(world: Any, track: Run, tmp_path
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (("--method", "pdr"), "--start: method pdr needs a start"),
+        (("--method", "pdr"), "--start: this method needs a start"),
         (("--method", "pdr", "--start", "1,2"), "'1,2' is not a start"),
         (("--method", "pdr", "--start", "a,b,F1"), "is not a start"),
         (("--method", "pdr", "--start", "nan,2,F1"), "is not a start"),
@@ -242,3 +242,16 @@ def test_two_recordings_of_one_name_are_refused(world: Any, track: Run, tmp_path
     assert said.code == 2
     assert path.stem in said.err
     assert str(other) in said.err
+
+
+def test_without_a_radio_map_a_start_will_do(world: Any, run_cli: Any, tmp_path: Path) -> None:
+    walk = sorted((world.folder / "walks").rglob("*.txt"))[0]
+    given = ("track", str(world.folder / "SITE"), str(walk), "--out", str(tmp_path / "EST.csv"))
+    said = run_cli(*given, "--method", "fused-no-wifi", "--start", "waypoint")
+    assert said.code == 0
+    rows = (tmp_path / "EST.csv").read_text(encoding="utf-8").splitlines()
+    assert len(rows) > 20
+    assert all(",fused-no-wifi," in row for row in rows[1:])
+    said = run_cli(*given)
+    assert said.code == 2
+    assert "--radio-map: method fused needs a radio map" in said.err

@@ -14,15 +14,20 @@ if TYPE_CHECKING:
     from wayfuse.evaluation.estimates_file import WalkEstimates
     from wayfuse.maps.site import Site
     from wayfuse.models.observation.coverage import SurveyDistance
+    from wayfuse.radio.survey import Survey
     from wayfuse.radio.walk_survey import WalkRadioMap
     from wayfuse.sensors.quality import Verdict
     from wayfuse.sensors.recording import Recording
 
 __all__ = ["METHODS", "track"]
 
+FROM_START = ("fused-no-wifi", "pdr")  # need a start instead of a radio map
 # name -> what it is; built by `presets.methods`
 METHODS = {
     "fused": "steps, Wi-Fi and floor plan in a particle filter",
+    "fused-no-wifi": "steps, stairs, lifts and floor plan from a known start (--start)",
+    "fused-no-barometer": "fused as on a phone without one",
+    "fused-no-offset": "fused that takes the phone's levels for the survey's",
     "fused-no-map": "fused without the floor plan",
     "fused-no-steps": "fused without steps",
     "fused-2.4ghz": "fused with the 2.4 GHz band alone",
@@ -38,7 +43,9 @@ METHODS = {
 @click.argument("site_folder", metavar="SITE", type=click.Path(path_type=Path))
 @click.argument("recordings", metavar="RECORDING...", nargs=-1, required=True)
 @click.option(
-    "--radio-map", type=click.Path(path_type=Path), required=True, help="From `wayfuse survey build`."
+    "--radio-map",
+    type=click.Path(path_type=Path),
+    help="From `wayfuse survey build`; only fused-no-wifi and pdr do without.",
 )
 @click.option(
     "--method",
@@ -54,13 +61,16 @@ METHODS = {
     "--lag", type=click.FloatRange(0.0, 60.0), default=0.0, help="Seconds an estimate may come later."
 )
 @click.option("--particles", type=click.IntRange(10, 1_000_000), default=1000, show_default=True)
-@click.option("--start", help="For pdr: X,Y,FLOOR, or `waypoint` for the first waypoint of each recording.")
+@click.option(
+    "--start",
+    help="For fused-no-wifi and pdr: X,Y,FLOOR, or `waypoint` for the first waypoint of each recording.",
+)
 @click.option("--jobs", type=click.IntRange(1), help="Processes (default: all cores).")
 @click.option("--out", type=click.Path(path_type=Path), required=True, help="EST.csv to write.")
 def track(
     site_folder: Path,
     recordings: tuple[str, ...],
-    radio_map: Path,
+    radio_map: Path | None,
     methods: tuple[str, ...],
     seed: int,
     lag: float,
@@ -72,7 +82,7 @@ def track(
     """Track recordings through SITE and write EST.csv.
 
     RECORDING is a file, a folder, or @FILE with a path per line. Waypoints and floor labels in the recordings are not
-    used (except by `pdr --start waypoint`, which says so).
+    used (except by `--start waypoint`, which says so).
 
     EST.csv has one row per scan and at least one a second: walk, t_ms (in the recording's own clock), x, y (metres of
     the floor's plan), floor, lat, lon, and more. With --lag L a row's position uses records up to t_ms + L seconds.
@@ -91,7 +101,7 @@ def track(
     parameters: dict[str, Any] = {"methods": list(methods), "particles": particles, "start": start or ""}
     sidecar = Sidecar(
         site=str(site_folder.resolve()),
-        radio_map=str(radio_map.resolve()),
+        radio_map=str(radio_map.resolve()) if radio_map else "",
         seed=seed,
         lag=lag,
         parameters=parameters,
@@ -165,7 +175,7 @@ class _Worker:
     def __init__(
         self,
         site: Path,
-        radio_map: Path,
+        radio_map: Path | None,
         methods: tuple[str, ...],
         seed: int,
         lag: float,
@@ -174,33 +184,49 @@ class _Worker:
     ) -> None:
         self.paths = site, radio_map
         self.methods, self.seed, self.lag, self.particles, self.start = methods, seed, lag, particles, start
-        self.loaded: tuple[Site, SurveyDistance, dict[str, Any]] | None = None
+        self.loaded: tuple[Site, SurveyDistance | None, dict[str, Any]] | None = None
 
     def __getstate__(self) -> dict[str, Any]:
         """Everything but what each process loads itself."""
         return {**self.__dict__, "loaded": None}
 
-    def prepare(self) -> tuple[Site, SurveyDistance, dict[str, Any]]:
+    def prepare(self) -> tuple[Site, SurveyDistance | None, dict[str, Any]]:
         """Load site and radio map and build the trackers, once per process."""
         if self.loaded is None:
             from wayfuse.maps.site import Site
             from wayfuse.models.observation.coverage import SurveyDistance
             from wayfuse.presets.methods import build_method
-            from wayfuse.radio.walk_survey import load
 
             site = Site.load(self.paths[0])
-            made = load(self.paths[1])
-            _check_made_for(made, site, self.paths[1])
-            survey = made.survey
-            if "pdr" in self.methods:
+            if any(name in FROM_START for name in self.methods):
                 _check_start(self.start, site)
-            trackers = {
-                name: build_method(name, site, survey, n_particles=self.particles, lag=self.lag)
-                for name in self.methods
-                if name != "pdr"
-            }
-            self.loaded = site, SurveyDistance.build(survey), trackers
+            survey = self._survey(site)
+            trackers = {}
+            if survey is not None:
+                trackers = {
+                    name: build_method(name, site, survey, n_particles=self.particles, lag=self.lag)
+                    for name in self.methods
+                    if name not in FROM_START
+                }
+            self.loaded = site, None if survey is None else SurveyDistance.build(survey), trackers
         return self.loaded
+
+    def _survey(self, site: Site) -> Survey | None:
+        from wayfuse.core.errors import UsageError
+        from wayfuse.radio.walk_survey import load
+
+        wanting = [name for name in self.methods if name not in FROM_START]
+        if self.paths[1] is None:
+            if wanting:
+                raise UsageError(
+                    f"method {wanting[0]} needs a radio map",
+                    where="--radio-map",
+                    remedy="give one, made by `wayfuse survey build`",
+                )
+            return None
+        made = load(self.paths[1])
+        _check_made_for(made, site, self.paths[1])
+        return made.survey
 
     def __call__(self, path: Path) -> _Result:
         """Read and track."""
@@ -224,34 +250,36 @@ class _Worker:
         result = _Result(ok=True)
         result.notes += [*recording.report.describe(), *_lacks(recording)]
         for name in self.methods:
-            tracker = trackers[name] if name != "pdr" else self._dead_reckoning(site, recording, result)
+            tracker = trackers.get(name) or self._from_start(name, site, recording, result)
             if tracker is None:
                 continue
             done = tracker.run(recording, self.seed)
             e = done.estimates
             columns = np.array([(r.x, r.y, r.floor) for r in e]).reshape(-1, 3)
-            away = distance.at(columns[:, 0], columns[:, 1], columns[:, 2].astype(np.int64))
+            away = None
+            if distance is not None:
+                away = distance.at(columns[:, 0], columns[:, 1], columns[:, 2].astype(np.int64))
             anchors = [floor.anchor for floor in site.floors]
             result.estimates.append(from_track(recording.name, name, e, site.floor_names, anchors, away))
             if name == self.methods[0]:
                 result.verdicts = done.verdicts
         return result
 
-    def _dead_reckoning(self, site: Site, recording: Recording, result: _Result) -> Any:
+    def _from_start(self, name: str, site: Site, recording: Recording, result: _Result) -> Any:
         from wayfuse.core.errors import MapError
         from wayfuse.models.survey_walk import place_of
-        from wayfuse.presets.baselines import dead_reckoning
+        from wayfuse.presets.methods import build_from_start
         from wayfuse.tracking.dead_reckoning import Start
 
-        if self.start != "waypoint":
-            return dead_reckoning(site, _check_start(self.start, site), lag=self.lag)
-        try:
-            place = place_of(site, recording.waypoints[0])
-        except (IndexError, MapError) as error:
-            why = "no waypoint" if isinstance(error, IndexError) else str(error)
-            result.notes.append(f"{recording.path}: {why}: pdr has no start, not tracked")
-            return None
-        return dead_reckoning(site, Start(*place), lag=self.lag)
+        start = _check_start(self.start, site)
+        if start is None:
+            try:
+                start = Start(*place_of(site, recording.waypoints[0]))
+            except (IndexError, MapError) as error:
+                why = "no waypoint" if isinstance(error, IndexError) else str(error)
+                result.notes.append(f"{recording.path}: {why}: {name} has no start, not tracked")
+                return None
+        return build_from_start(name, site, start, n_particles=self.particles, lag=self.lag)
 
 
 def _check_start(start: str | None, site: Site) -> Any:
@@ -271,7 +299,7 @@ def _check_start(start: str | None, site: Site) -> Any:
             raise ValueError
     except (IndexError, ValueError):
         raise UsageError(
-            "method pdr needs a start" if not start else f"'{start}' is not a start",
+            "this method needs a start" if not start else f"'{start}' is not a start",
             where="--start",
             remedy="give X,Y,FLOOR in metres of the plan, or waypoint",
         ) from None

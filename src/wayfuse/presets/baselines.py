@@ -1,6 +1,7 @@
 """What ``fused`` has to beat, each tuned for itself on the same development folds.
 
-NNSS: nearest neighbour in signal space. Weighted k-NN: the same map as ``fused``, per scan. Random walk: the particle
+NNSS: nearest neighbour in signal space. Weighted k-NN: the same map as ``fused``, per scan, the phone's
+offset estimated as there. Random walk: the particle
 filter without steps; without motion information a map and a sharp filter only hurt, so its own best parameters are far
 from those of ``fused``. Dead reckoning: steps from a known start.
 """
@@ -9,6 +10,7 @@ from __future__ import annotations
 
 from wayfuse.maps.site import Site
 from wayfuse.presets.fused import Config, build, check_floors, prior_estimate
+from wayfuse.radio.device_offset import DeviceOffset
 from wayfuse.radio.sparse_knn import SparseKnn
 from wayfuse.radio.survey import Survey
 from wayfuse.tracking.dead_reckoning import DeadReckoning, DeadReckoningState, Start
@@ -36,9 +38,10 @@ def nnss(site: Site, survey: Survey, *, lag: float = 0.0) -> Tracker[FixState]:
 
 
 def wknn(site: Site, survey: Survey, *, lag: float = 0.0) -> Tracker[FixState]:
-    """Weighted k nearest neighbours, k = 40 at temperature 0.02."""
+    """Weighted k nearest neighbours, k = 40 at temperature 0.02, with the phone's offset estimated."""
     check_floors(site, survey)
-    return Tracker(engine=FixEngine(radio_map=SparseKnn(survey), prior=prior_estimate(site)), lag=lag)
+    engine = FixEngine(radio_map=SparseKnn(survey), prior=prior_estimate(site), device=DeviceOffset())
+    return Tracker(engine=engine, lag=lag)
 
 
 def random_walk(site: Site, survey: Survey, *, lag: float = 0.0) -> Tracker[ParticleState]:

@@ -10,6 +10,7 @@ import numpy as np
 from wayfuse.core.errors import UsageError
 from wayfuse.inertial.front_end import StepEvent
 from wayfuse.inertial.vertical import VerticalEvent
+from wayfuse.radio.device_offset import DeviceOffset, OffsetState, shifted
 from wayfuse.radio.sparse_knn import SparseKnn, fix_of
 from wayfuse.radio.survey import Fingerprint
 from wayfuse.tracking.engine import Known, Why, unknown
@@ -19,10 +20,11 @@ __all__ = ["FixEngine", "FixState"]
 
 
 class FixState(NamedTuple):
-    """The last fix (None before the first) and what went into it."""
+    """The last fix (None before the first), what went into it, and what is known of the phone."""
 
     fix: Estimate | None = None
     why: Why = Why()
+    offset: OffsetState | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -32,6 +34,7 @@ class FixEngine:
     Parameters
     ----------
     radio_map : with k = 1 this is NNSS. prior : the estimate before the first fix.
+    device : estimates how the phone's levels differ from the survey's, None = not at all.
     radius_68, radius_95 : offset (m) and slope (m per unit of signal distance) of the radii.
     """
 
@@ -39,6 +42,7 @@ class FixEngine:
     prior: Estimate
     radius_68: tuple[float, float] = (3.0, 15.0)
     radius_95: tuple[float, float] = (6.0, 45.0)
+    device: DeviceOffset | None = None
     uses_steps: bool = True  # steps are counted, nothing else
     uses_scans: bool = True
     supports_lag: bool = False
@@ -46,7 +50,7 @@ class FixEngine:
 
     def init(self, track: str, seed: int) -> FixState:
         """State before the first record."""
-        return FixState()
+        return FixState(offset=None if self.device is None else self.device.init())
 
     def on_step(self, state: FixState, event: StepEvent) -> FixState:
         """Steps do not move a fix."""
@@ -68,6 +72,10 @@ class FixEngine:
         known: Known,
     ) -> FixState:
         """The new fix, where the scan holds a known access point."""
+        offset = state.offset
+        if self.device is not None and offset is not None:
+            offset = self.device.step(offset, self.radio_map, fingerprint)
+            fingerprint = shifted(fingerprint, self.device.shift(offset))
         near = self.radio_map.neighbours(fingerprint)
         if near is None:
             return state
@@ -79,7 +87,7 @@ class FixEngine:
         r95 = max(self.radius_95[0] + self.radius_95[1] * near.distance, r68)
         xx, xy, yy = (float(np.sum(w * a * b)) for a, b in ((dx, dx), (dx, dy), (dy, dy)))
         said = Estimate(t, fix.x, fix.y, fix.floor, xx, xy, yy, r68, r95, State.TRACKING)
-        return FixState(said, Why(n_aps=near.n_aps))
+        return FixState(said, Why(n_aps=near.n_aps), offset)
 
     def estimate(self, state: FixState, t: float) -> tuple[FixState, Estimate]:
         """The last fix."""
