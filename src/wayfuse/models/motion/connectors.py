@@ -236,7 +236,8 @@ class ConnectorMotion:
 
     def _can_rest(self, connector: int, z: float) -> bool:
         heights = self._elevation[self._served(connector)]
-        inside = heights[0] + _AT_A_FLOOR < z < heights[-1] - _AT_A_FLOOR
+        off = float(np.abs(heights - z).min())  # at a floor between it has arrived there, not half-way
+        inside = heights[0] < z < heights[-1] and off > _AT_A_FLOOR
         return bool(inside) and self.site.connectors[connector].kind != ConnectorKind.LIFT
 
     def _agreement(self, difference: Array, rise: float, sigma: float) -> Array:
