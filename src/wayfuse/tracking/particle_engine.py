@@ -40,8 +40,9 @@ class Recovery:
 
     injection : share of particles drawn afresh at each scan. agreement : a scan contradicts the cloud when the cloud's
     mean likelihood is below this share of what the scan's own neighbours have. patience : scans in a row until the
-    track is lost and ``reset_share`` of the particles are drawn afresh. hold, hold_moving : share of the weight that
-    keeps the floor said before, on a floor, and on stairs or in a lift. settled : m, r95 below which a track is no
+    track is lost and ``reset_share`` of the particles are drawn afresh. hold, hold_height, hold_moving : share of the
+    weight that keeps the floor said before: on a floor, on a floor where a barometer would have told of a change, and
+    on stairs or in a lift. settled : m, r95 below which a track is no
     longer initialising. lost : m, r95 above which a settled track is lost.
     """
 
@@ -50,6 +51,7 @@ class Recovery:
     patience: int = 3
     reset_share: float = 0.5
     hold: float = 0.15
+    hold_height: float = 0.05
     hold_moving: float = 0.4
     settled: float = 25.0
     lost: float = 60.0
@@ -74,6 +76,7 @@ class ParticleState(NamedTuple):
     offset: OffsetState | None = None
     movement: Movement = Movement()
     said: int = -1
+    height_known: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -177,7 +180,8 @@ class ParticleEngine:
         offset, near = self.radio.neighbours(state.offset, fingerprint)
         if near is None:
             return state
-        state = state._replace(offset=offset, why=state.why._replace(n_aps=max(state.why.n_aps, near.n_aps)))
+        why = state.why._replace(n_aps=max(state.why.n_aps, near.n_aps))
+        state = state._replace(offset=offset, height_known=known.height, why=why)
         if state.filter is None:
             noise = Noise(state.key)
             cloud = self.radio.first.draw(noise, near, self.n_particles, heading_known=known.heading)
@@ -263,14 +267,18 @@ class ParticleEngine:
         assert state.filter is not None  # noqa: S101 (callers checked)
         held = None
         if self.floor_change is not None and state.said >= 0:
-            is_moving = state.movement.event is not None
-            held = Held(state.said, self.recovery.hold_moving if is_moving else self.recovery.hold)
+            held = Held(state.said, self._hold(state))
         e = summarise(where, state.filter.weights, self.n_floors, t, self.summary, held)
         e = on_walkable(e, where, self.walkable)
         is_settled = state.is_settled or e.r95 <= self.recovery.settled
         lost = state.contradictions >= self.recovery.patience or (is_settled and e.r95 > self.recovery.lost)
         label = State.LOST if lost else State.TRACKING if is_settled else State.INITIALISING
         return self._explained(state._replace(is_settled=is_settled, said=e.floor), e._replace(state=label))
+
+    def _hold(self, state: ParticleState) -> float:
+        if state.movement.event is not None:
+            return self.recovery.hold_moving
+        return self.recovery.hold_height if state.height_known else self.recovery.hold
 
     @staticmethod
     def _explained(state: ParticleState, e: Estimate) -> tuple[ParticleState, Estimate]:

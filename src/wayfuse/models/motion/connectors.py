@@ -128,11 +128,13 @@ class ConnectorMotion:
         """Where the rise has taken those aboard: between two landings, on the floor they are nearest.
 
         On an unlisted connector they keep their floor until the movement ends: which floors it serves is not known.
+        In a lift they are not on the floors they pass: nobody knows where it stops until it does, or until only the
+        last floor is left.
         """
         x, y, floor = cloud.x.copy(), cloud.y.copy(), cloud.floor.copy()
         listed = np.flatnonzero(cloud.connector >= 0)
         for rows, (c, base, now) in _groups(listed, cloud.connector, cloud.base, cloud.floor):
-            f = self._nearest(self._served(int(c)), base + event.rise, int(now))
+            f = self._nearest(self._within_reach(int(c), base, event.rise), base + event.rise, int(now))
             floor[rows] = f
             x[rows], y[rows] = self._between(int(c), base + event.rise, f).astype(np.float32)
         return cloud._replace(x=x, y=y, floor=floor)
@@ -221,6 +223,14 @@ class ConnectorMotion:
         if connector == UNLISTED:
             return np.arange(len(self._elevation))
         return np.flatnonzero(np.isfinite(self._landing[connector, :, 0]))
+
+    def _within_reach(self, connector: int, base: float, rise: float) -> NDArray[np.int64]:
+        """Floors somebody can be said to be on while under way."""
+        served = self._served(connector)
+        if self.site.connectors[connector].kind != ConnectorKind.LIFT:
+            return served
+        start = served[np.argmin(np.abs(self._elevation[served] - base))]
+        return np.array([start, served[-1] if rise > 0.0 else served[0]])
 
     def _nearest(self, served: NDArray[np.int64], z: float, now: int) -> int:
         off = np.abs(self._elevation[served] - z)
