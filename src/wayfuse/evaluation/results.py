@@ -1,4 +1,4 @@
-"""Every figure of docs/results.md, measured afresh: one section per data set.
+"""Every figure of docs/results.md, measured afresh: one section per question and data set.
 
 A section whose data are not there whole is not measured, and says why; nothing stands in for them.
 """
@@ -7,27 +7,43 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from wayfuse.core.errors import UsageError
 from wayfuse.evaluation.report import plain
+from wayfuse.evaluation.results_behaviours import measure_behaviours
 from wayfuse.evaluation.results_folds import FOLDS, Folds, Mapper, gather, in_turn
+from wayfuse.evaluation.results_hcu import measure_hcu
+from wayfuse.evaluation.results_ipin2023 import measure_ipin2023
 from wayfuse.evaluation.results_ms_indoor import measure_ms_indoor
+from wayfuse.evaluation.results_repetitions import gather as gather_repetitions
 from wayfuse.evaluation.results_speed import measure_speed
 from wayfuse.evaluation.results_static import measure_static
 from wayfuse.evaluation.results_steps import measure_steps
 from wayfuse.formats.datasets import manifest
 
-__all__ = ["SECTIONS", "absent", "measure"]
+__all__ = ["SECTIONS", "Need", "absent", "measure"]
 
-# section -> the data set it needs
-SECTIONS: Mapping[str, str] = {
-    "ms-indoor": "ms-indoor",
-    "speed": "ms-indoor",
-    "sodindoorloc": "sodindoorloc",
-    "oxford-steps": "oxford-steps",
+
+class Need(NamedTuple):
+    """A data set, or its files below a folder of it, that a section is measured on."""
+
+    data: str
+    below: str = ""
+
+
+_LOGS = Need("ipin2023-track3", "logs/")
+_HCU = Need("maps", "hcu_ipin21/")
+SECTIONS: Mapping[str, tuple[Need, ...]] = {
+    "ms-indoor": (Need("ms-indoor"),),
+    "speed": (Need("ms-indoor"),),
+    "ipin2023": (_LOGS,),
+    "behaviours": (_LOGS, _HCU),
+    "hcu": (_HCU,),
+    "sodindoorloc": (Need("sodindoorloc"),),
+    "oxford-steps": (Need("oxford-steps"),),
 }
-_NEEDED = (".txt", ".json", ".csv")  # pictures and sheets of a data set are not measured on
+_NEEDED = (".txt", ".json", ".geojson", ".csv")  # pictures and sheets of a data set are not measured on
 
 
 def measure(root: Path, only: Sequence[str] = (), mapper: Mapper = in_turn) -> dict[str, dict[str, Any]]:
@@ -49,6 +65,7 @@ def measure(root: Path, only: Sequence[str] = (), mapper: Mapper = in_turn) -> d
     if unknown:
         raise UsageError(f"no section {unknown[0]!r}", where="--only", remedy=f"one of {', '.join(SECTIONS)}")
     read: list[Folds] = []
+    logs, hcu = root / _LOGS.data / _LOGS.below, root / _HCU.data / _HCU.below
 
     def folds() -> Folds:
         if not read:
@@ -58,21 +75,24 @@ def measure(root: Path, only: Sequence[str] = (), mapper: Mapper = in_turn) -> d
     work: dict[str, Callable[[], dict[str, Any]]] = {
         "ms-indoor": lambda: measure_ms_indoor(folds(), mapper=mapper),
         "speed": lambda: measure_speed(folds()),
+        "ipin2023": lambda: measure_ipin2023(gather_repetitions(logs, mapper), mapper=mapper),
+        "behaviours": lambda: measure_behaviours(logs, hcu / "SensorLog", mapper),
+        "hcu": lambda: measure_hcu(hcu),
         "sodindoorloc": lambda: measure_static(root / "sodindoorloc", mapper=mapper),
         "oxford-steps": lambda: measure_steps(root / "oxford-steps"),
     }
     out: dict[str, dict[str, Any]] = {}
-    for name, data in SECTIONS.items():
+    for name, needs in SECTIONS.items():
         if only and name not in only:
             continue
-        why = absent(data, root)
+        why = next(filter(None, (absent(need.data, root, need.below) for need in needs)), "")
         out[name] = {"measured": False, "why": why} if why else {"measured": True, **plain(work[name]())}
     return out
 
 
-def absent(name: str, root: Path) -> str:
-    """What is missing of a data set below the root, in a sentence; empty where it is whole."""
-    needed = [entry.path for entry in manifest(name) if entry.path.endswith(_NEEDED)]
+def absent(name: str, root: Path, below: str = "") -> str:
+    """What is missing of a data set (or of a part of it) below the root, in a sentence; empty where it is whole."""
+    needed = [e.path for e in manifest(name) if e.path.endswith(_NEEDED) and e.path.startswith(below)]
     missing = sum(not (root / name / path).is_file() for path in needed)
     if not missing:
         return ""

@@ -20,8 +20,7 @@ from wayfuse.evaluation.results_folds import (
     minutes_of,
     track_fold,
 )
-from wayfuse.evaluation.results_pool import Pooled, comparison, coverage_of, figures, pool, splits
-from wayfuse.evaluation.truth import TIMES
+from wayfuse.evaluation.results_pool import Pooled, comparison, coverage_of, figures_of_all, pool, splits
 from wayfuse.presets import baselines, fused
 
 __all__ = ["DEVELOPMENT", "POOLED", "measure_ms_indoor"]
@@ -52,7 +51,7 @@ def measure_ms_indoor(
         "seeds": list(seeds),
         "bootstrap": asdict(draw),
         "parameters": {"fused": asdict(fused.Config()), "random-walk": _changed()},
-        "figures": {name: _figures(name, of, draw, mapper) for name, of in sets.items()},
+        "figures": {name: figures_of_all(name, of, draw, mapper) for name, of in sets.items()},
         "comparisons": {name: _comparisons(sets[name], draw) for name in shown},
         "coverage": {
             name: {m: coverage_of(of[m], draw) for m in _STATED if m in of} for name, of in sets.items()
@@ -68,22 +67,6 @@ def _sets(scores: Mapping[int, Scores]) -> dict[str, dict[str, Pooled]]:
     if len(scores) > 1:
         out[POOLED] = pool(list(scores.values()))
     return out
-
-
-def _figures(name: str, of: Mapping[str, Pooled], draw: Bootstrap, mapper: Mapper) -> dict[str, Any]:
-    """Figures at 1 Hz and at waypoints, by method."""
-    found = list(mapper(_Bootstrapper(of, draw), list(of), f"intervals, {name}"))
-    return {at: {method: f[at] for method, f in zip(of, found, strict=True)} for at in TIMES}
-
-
-class _Bootstrapper:
-    """Figures of one method; travels to the worker processes."""
-
-    def __init__(self, of: Mapping[str, Pooled], draw: Bootstrap) -> None:
-        self.of, self.draw = of, draw
-
-    def __call__(self, method: str) -> dict[str, Any]:
-        return {at: figures(self.of[method], at, self.draw) for at in TIMES}
 
 
 def _describe(folds: Folds, fold: int) -> dict[str, Any]:

@@ -16,9 +16,10 @@ from wayfuse.evaluation.calibration import calibrate, time_bins
 from wayfuse.evaluation.errors import PointErrors, Scores, summarise
 from wayfuse.evaluation.intervals import Bootstrap, compare, error_intervals
 from wayfuse.evaluation.report import survey_bins
+from wayfuse.evaluation.results_folds import Mapper, in_turn
 from wayfuse.evaluation.truth import TIMES
 
-__all__ = ["Pooled", "comparison", "coverage_of", "figures", "pool", "splits"]
+__all__ = ["Pooled", "comparison", "coverage_of", "figures", "figures_of_all", "paired", "pool", "splits"]
 
 _APART = 1e10  # s between the times of seeds, beyond any clock
 
@@ -76,15 +77,31 @@ def figures(pooled: Pooled, at: str, draw: Bootstrap) -> dict[str, Any]:
     }
 
 
+def figures_of_all(
+    label: str, of: Mapping[str, Pooled], draw: Bootstrap, mapper: Mapper = in_turn
+) -> dict[str, dict[str, Any]]:
+    """Figures at 1 Hz and at waypoints, by method."""
+    found = list(mapper(_Bootstrapper(of, draw), list(of), f"intervals, {label}"))
+    return {at: {method: f[at] for method, f in zip(of, found, strict=True)} for at in TIMES}
+
+
+class _Bootstrapper:
+    """Figures of one method; travels to the worker processes."""
+
+    def __init__(self, of: Mapping[str, Pooled], draw: Bootstrap) -> None:
+        self.of, self.draw = of, draw
+
+    def __call__(self, method: str) -> dict[str, Any]:
+        return {at: figures(self.of[method], at, self.draw) for at in TIMES}
+
+
 def comparison(method: Pooled, base: Pooled, draw: Bootstrap) -> dict[str, Any]:
     """Paired difference of a method and a baseline at 1 Hz: same walk, same time, and seed with seed.
 
     A method without seeds stands beside each seed of the other.
     """
-    a, b = method.used("1hz"), base.used("1hz")
-    n = max(len(a), len(b))
-    pair = [PointErrors.join([_apart(side[s % len(side)], s) for s in range(n)]) for side in (a, b)]
-    found = compare(method.name, pair[0], base.name, pair[1], draw)
+    points, base_points = paired(method, base, "1hz")
+    found = compare(method.name, points, base.name, base_points, draw)
     wanted = ("mean", "p50", "p90")
     return {
         "method": method.name,
@@ -93,6 +110,14 @@ def comparison(method: Pooled, base: Pooled, draw: Bootstrap) -> dict[str, Any]:
         "difference": {name: asdict(found.difference[name]) for name in wanted},
         "reduction": {name: asdict(found.reduction[name]) for name in wanted},
     }
+
+
+def paired(method: Pooled, base: Pooled, at: str) -> tuple[PointErrors, PointErrors]:
+    """Points of both, all seeds below each other, whose times tell the seed; for `wayfuse.evaluation.intervals`."""
+    a, b = method.used(at), base.used(at)
+    n = max(len(a), len(b))
+    one, other = (PointErrors.join([_apart(side[s % len(side)], s) for s in range(n)]) for side in (a, b))
+    return one, other
 
 
 def _apart(points: PointErrors, seed: int) -> PointErrors:
