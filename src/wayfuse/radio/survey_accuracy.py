@@ -8,6 +8,8 @@ errors is kept. Not the median: bad fixes are the filter's background, the width
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from wayfuse.core.types import Array
@@ -20,9 +22,14 @@ _LEAST = 20  # held-out fixes below which nothing is said
 
 
 def survey_accuracy(survey: Survey, n: int = 300) -> float:
-    """Lower quartile of `held_out_errors` (m); NaN with fewer than two walks, or too little in common."""
-    errors = held_out_errors(survey, n)
-    return float(np.quantile(errors, 0.25)) if len(errors) >= _LEAST else float("nan")
+    """Lower quartile of `held_out_errors` (m).
+
+    NaN with fewer than two walks, too little in common, or hardly a fingerprint found on its floor.
+    """
+    errors = np.sort(held_out_errors(survey, n))
+    if len(errors) < _LEAST or np.isinf(errors[math.ceil(0.25 * (len(errors) - 1))]):
+        return math.nan
+    return float(np.quantile(errors, 0.25))
 
 
 def held_out_errors(survey: Survey, n: int = 300) -> Array:
@@ -36,7 +43,9 @@ def held_out_errors(survey: Survey, n: int = 300) -> Array:
         columns = survey.indices[part]
         query = Fingerprint(survey.bssid[columns], survey.rssi[part], survey.frequency[columns])
         near = radio_map.neighbours(query, without_walk=int(survey.walk[row]))
-        if near is None:
+        if (
+            near is None or near.distance >= 1.0
+        ):  # the nearest of the other walks has nothing in common with it
             continue
         fix = fix_of(near, len(survey.floors))
         x, y = survey.xy[row]
