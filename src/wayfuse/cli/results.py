@@ -27,7 +27,7 @@ T = TypeVar("T")
     "--only",
     multiple=True,
     metavar="SECTION",
-    help="ms-indoor, speed, sodindoorloc, oxford-steps; repeatable.",
+    help="ms-indoor, speed, ipin2023, behaviours, hcu, sodindoorloc, oxford-steps; repeatable.",
 )
 @click.option("--json", "json_file", type=click.Path(path_type=Path), help="Also write all figures as JSON.")
 @click.option(

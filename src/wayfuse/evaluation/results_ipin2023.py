@@ -14,7 +14,7 @@ from wayfuse.evaluation.floor_changes import score_changes
 from wayfuse.evaluation.intervals import Bootstrap, compare
 from wayfuse.evaluation.results_bars import Bar, at_least, at_most
 from wayfuse.evaluation.results_folds import SEEDS, Mapper, in_turn, minutes_of
-from wayfuse.evaluation.results_pool import Pooled, figures_of_all, paired, pool
+from wayfuse.evaluation.results_pool import Pooled, figures_of_all, paired, pool, splits
 from wayfuse.evaluation.results_repetitions import (
     METHODS,
     OFF_ROUTE,
@@ -58,6 +58,7 @@ def measure_ipin2023(
         "surveys": [_survey(repetitions, number) for number in repetitions.numbers],
         "figures": {name: figures_of_all(name, of, draw, mapper) for name, of in groups.items()},
         "off_route": figures_of_all(_OFF_ROUTE, off, draw, mapper),
+        "off_route_by_distance": {name: splits(p)["by_survey_distance"] for name, p in off.items()},
         "comparisons": {
             name: [_comparison(of[_FUSED], base, draw) for m, base in of.items() if m != _FUSED]
             for name, of in {**groups, _OFF_ROUTE: off}.items()

@@ -115,7 +115,7 @@ def _read(path: Path) -> Recording:
 
 
 class Tracked(NamedTuple):
-    """Scores (methods are named ``method#seed``) of each repetition, and all tracks."""
+    """Scores (methods are named ``method#seed``), one for each survey, and all tracks."""
 
     scores: list[Scores]
     tracks: list[WalkEstimates]
@@ -131,18 +131,26 @@ def track(
 ) -> Tracked:
     """Track every recording (off route: those that stay on a floor) by every method and seed, and score it."""
     worker = _Worker(repetitions, methods, seeds, off_route)
-    names = [r.name for r in repetitions.recordings if not (off_route and key_of(r.name).changes_floors)]
-    names.sort(key=lambda name: key_of(name)[::-1])  # those of one survey after another
+    mine = [r for r in repetitions.recordings if not (off_route and key_of(r.name).changes_floors)]
+    by_survey: dict[tuple[int, int], list[Recording]] = {}
+    for recording in mine:
+        by_survey.setdefault(_surveyed_by(recording.name, off_route), []).append(recording)
+    names = [recording.name for group in by_survey.values() for recording in group]
     label = "tracking off route" if off_route else "tracking"
     found = dict(zip(names, mapper(worker, names, label), strict=True))
-    scores = []
-    for number in repetitions.numbers:
-        mine = [r for r in repetitions.of(number) if r.name in found]
-        if mine:
-            survey = None if off_route else repetitions.survey(number)
-            tracks = [one for r in mine for one in found[r.name]]
-            scores.append(score(tracks, mine, repetitions.site, survey))
-    return Tracked(scores, [one for of_walk in found.values() for one in of_walk])
+    scores = [
+        score(
+            [one for r in group for one in found[r.name]], group, repetitions.site, repetitions.survey(*key)
+        )
+        for key, group in by_survey.items()
+    ]
+    return Tracked(scores, [one for of_recording in found.values() for one in of_recording])
+
+
+def _surveyed_by(name: str, off_route: bool) -> tuple[int, int]:
+    """Repetition and trial that are left out of the survey of a recording; trial 0 is none."""
+    key = key_of(name)
+    return key.repetition, key.trial if off_route else 0
 
 
 class _Worker:
@@ -158,18 +166,16 @@ class _Worker:
         self.trackers: Mapping[str, Tracker[Any]] = {}
 
     def __call__(self, name: str) -> list[WalkEstimates]:
-        key, recording = key_of(name), self.recordings[name]
-        trackers, site = self._trackers(key), self.repetitions.site
+        trackers, site = self._trackers(_surveyed_by(name, self.off_route)), self.repetitions.site
         out = []
         for method in self.methods:
             for seed in self.seeds if method not in FIXES else self.seeds[:1]:
-                done = trackers[method].run(recording, seed)
+                done = trackers[method].run(self.recordings[name], seed)
                 out.append(from_track(name, f"{method}#{seed}", done.estimates, site.floor_names))
         return out
 
-    def _trackers(self, key: Key) -> Mapping[str, Tracker[Any]]:
+    def _trackers(self, wanted: tuple[int, int]) -> Mapping[str, Tracker[Any]]:
         """Trackers of a survey; the last are kept, for recordings of one survey come in a row."""
-        wanted = key.repetition, key.trial if self.off_route else 0
         if wanted != self.known:
             survey = self.repetitions.survey(*wanted)
             site = self.repetitions.site
