@@ -8,6 +8,7 @@ was made.
 
 from __future__ import annotations
 
+import math
 import tomllib
 from importlib.resources import files
 from pathlib import Path
@@ -70,13 +71,22 @@ def _positions(logs: list[Path]) -> dict[str, Array]:
             for number, line in enumerate(lines, 1):
                 if line.startswith("POSI;"):
                     try:
-                        _, _, _, lat, lon, floor = line.split(";")[:6]
-                        found.setdefault(f"{float(floor):.0f}", []).append((float(lon), float(lat)))
+                        floor, place = _position(line)
                     except ValueError as fault:
                         raise MapError(
                             f"damaged position: {fault}", where=f"{log}:{number}", remedy="fetch the log anew"
                         ) from fault
+                    found.setdefault(floor, []).append(place)
     return {floor: np.array(places) for floor, places in found.items()}
+
+
+def _position(line: str) -> tuple[str, tuple[float, float]]:
+    """Floor name, and longitude and latitude (degrees)."""
+    _, _, _, lat, lon, floor = line.split(";")[:6]
+    place = float(lon), float(lat)
+    if not (abs(place[0]) <= 180.0 and abs(place[1]) <= 90.0 and math.isfinite(float(floor))):
+        raise ValueError(f"longitude {lon}, latitude {lat}, floor {floor.strip()}")
+    return f"{round(float(floor))}", place
 
 
 def _floor(name: str, xy: Array, elevation: float, extent: Array, anchor: GeoAnchor) -> Floor:
