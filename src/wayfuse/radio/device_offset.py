@@ -56,25 +56,29 @@ class DeviceOffset:
     Parameters
     ----------
     reach, spacing : dB, the grid of shifts goes from -reach to reach. prior : dB, standard deviation of the shift
-    before the first scan, per band. temperature : T, signal distance that counts one nat. k : fingerprints whose mean
-    distance is the cost. burn_in : scans that are all judged; then one in ``every``, to spare time. memory : scans
-    after which old costs have faded to 1/e; a hand over the antenna changes the offset within a walk.
+    before the first scan, per band. same_phone : nats in favour of no shift at all: many a phone is the surveyor's.
+    temperature : T, signal distance that counts one nat. k : fingerprints whose mean
+    distance is the cost. strongest : readings of a scan that are looked at, for more only take time. burn_in : scans
+    that are all judged; then one in ``every``, to spare time. memory : scans after which old costs have faded to 1/e;
+    a hand over the antenna changes the offset within a walk.
     """
 
     reach: float = 14.0
     spacing: float = 2.0
     prior: tuple[float, float] = (6.0, 3.0)
+    same_phone: float = 2.0
     temperature: float = 0.03
     k: int = 5
     burn_in: int = 12
+    strongest: int = 40
     every: int = 4
     memory: float = 60.0
 
     def __post_init__(self) -> None:
         if not (self.reach >= self.spacing > 0.0 and min(self.prior) > 0.0 and self.temperature > 0.0):
             raise ConfigError("reach, spacing, prior and temperature must be positive", where="DeviceOffset")
-        if self.k < 1 or self.every < 1 or not self.memory > 0.0:
-            raise ConfigError("k, every and memory must be positive", where="DeviceOffset")
+        if min(self.k, self.every, self.strongest) < 1 or not self.memory > 0.0:
+            raise ConfigError("k, every, strongest and memory must be positive", where="DeviceOffset")
 
     @property
     def grid(self) -> Array:
@@ -85,7 +89,9 @@ class DeviceOffset:
     def init(self) -> OffsetState:
         """State before the first scan: the prior."""
         s = self.grid
-        return OffsetState(np.stack([0.5 * (s / sigma) ** 2 for sigma in self.prior]))
+        cost = np.stack([0.5 * (s / sigma) ** 2 for sigma in self.prior])
+        cost[:, s == 0.0] -= self.same_phone
+        return OffsetState(cost)
 
     def shift(self, state: OffsetState) -> Array:
         """Posterior mean of the shift (N_BANDS,) dB to add to the device's levels."""
@@ -97,14 +103,18 @@ class DeviceOffset:
         state = state._replace(n_seen=state.n_seen + 1)
         if state.n_seen > self.burn_in and state.n_seen % self.every:
             return state
-        mean, band, grid = self.shift(state), band_of(fingerprint.frequency), self.grid
+        bssid, rssi, frequency = fingerprint
+        if len(rssi) > self.strongest:
+            loud = np.sort(np.argsort(-rssi, kind="stable")[: self.strongest])
+            bssid, rssi, frequency = bssid[loud], rssi[loud], frequency[loud]
+        mean, band, grid = self.shift(state), band_of(frequency), self.grid
         added = np.zeros_like(state.cost)
         for b in range(N_BANDS):
             if not np.any(band == b):
                 continue
             trial = np.where((band == b)[:, None], grid, mean[band][:, None])
-            levels = (fingerprint.rssi[:, None] + trial).astype(np.float32)
-            distance = radio_map.mean_distances(fingerprint.bssid, levels, self.k)
+            levels = (rssi[:, None] + trial).astype(np.float32)
+            distance = radio_map.mean_distances(bssid, levels, self.k)
             if distance is None:  # a scan of unknown access points says nothing
                 return state
             added[b] = distance

@@ -40,10 +40,10 @@ class Recovery:
 
     injection : share of particles drawn afresh at each scan. agreement : a scan contradicts the cloud when the cloud's
     mean likelihood is below this share of what the scan's own neighbours have. patience : scans in a row until the
-    track is lost and ``reset_share`` of the particles are drawn afresh. hold, hold_height, hold_moving : share of the
-    weight that keeps the floor said before: on a floor, on a floor where a barometer would have told of a change, and
-    on stairs or in a lift. settled : m, r95 below which a track is no
-    longer initialising. lost : m, r95 above which a settled track is lost.
+    track is lost and ``reset_share`` of the particles are drawn afresh. hold, hold_start, hold_height, hold_moving :
+    share of the weight that keeps the floor said before: on a floor; before the first few steps; where a barometer
+    would have told of a change; on stairs or in a lift. settled : m, r95 below which a track is no longer
+    initialising. lost : m, r95 above which a settled track is lost.
     """
 
     injection: float = 0.003
@@ -51,6 +51,7 @@ class Recovery:
     patience: int = 3
     reset_share: float = 0.5
     hold: float = 0.15
+    hold_start: float = 0.3
     hold_height: float = 0.05
     hold_moving: float = 0.4
     settled: float = 25.0
@@ -59,6 +60,9 @@ class Recovery:
     def __post_init__(self) -> None:
         if not (0.0 <= self.injection < 1.0 and 0.0 <= self.reset_share <= 1.0 and self.patience >= 1):
             raise ConfigError("injection and reset_share are shares, patience at least 1", where="Recovery")
+
+
+_UNCORROBORATED = 10  # steps before which no walk has told the floors apart
 
 
 class ParticleState(NamedTuple):
@@ -77,6 +81,8 @@ class ParticleState(NamedTuple):
     movement: Movement = Movement()
     said: int = -1
     height_known: bool = False
+    scanned: float = -np.inf
+    n_walked: int = 0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -155,7 +161,7 @@ class ParticleEngine:
                 state.key, state.filter, after, state.movement, event.t, step
             )
             state = state._replace(movement=movement)
-        return self._moved(state, after, n_blocked, why)._replace(is_quiet=False)
+        return self._moved(state, after, n_blocked, why)._replace(is_quiet=False, n_walked=state.n_walked + 1)
 
     def on_vertical(self, state: ParticleState, event: VerticalEvent) -> ParticleState:
         """Take the cloud over stairs or by lift; before the first scan there is nothing to take."""
@@ -186,22 +192,34 @@ class ParticleEngine:
             noise = Noise(state.key)
             cloud = self.radio.first.draw(noise, near, self.n_particles, heading_known=known.heading)
             return state._replace(filter=FilterState(cloud, np.zeros(self.n_particles), noise.draw))
-        return self._weigh(state, state.filter, self.radio, near, known)
+        spacing = t - state.scanned
+        state = self._weigh(state, state.filter, self.radio, near, known, spacing)
+        return state._replace(scanned=t)
 
     def _weigh(
-        self, state: ParticleState, now: FilterState, radio: Radio, near: Neighbours, known: Known
+        self,
+        state: ParticleState,
+        now: FilterState,
+        radio: Radio,
+        near: Neighbours,
+        known: Known,
+        spacing: float,
     ) -> ParticleState:
         log_likelihood = np.zeros(self.n_particles)
         radio.observation.log_likelihood(now.cloud, near, log_likelihood)
         agreement = radio.observation.agreement(now.weights, log_likelihood, near)
         is_moving = state.movement.event is not None  # nobody is drawn afresh onto stairs or into a lift
-        log_likelihood *= radio.gain(is_quiet=state.is_quiet, is_moving=is_moving)
+        log_likelihood *= radio.gain(spacing, is_quiet=state.is_quiet, is_moving=is_moving)
         inject = self.recovery.injection > 0.0 and not is_moving
         after, info = self.filter.update(state.key, now, log_likelihood, always_resample=inject)
         contradicts = agreement < self.recovery.agreement and not is_moving
         contradictions = state.contradictions + 1 if contradicts else 0
         if not is_moving:
-            after = self._renewed(state.key, after, radio, near, contradictions, known)
+            keeps = self.floor_change is not None and known.height and state.n_walked >= _UNCORROBORATED
+            share, keeps_floor = self._renewal(contradictions)
+            after = self._renewed(
+                state.key, after, radio, near, share, known, keeps_floor=keeps and keeps_floor
+            )
         ess = info.ess / self.n_particles
         return state._replace(filter=after, contradictions=contradictions, ess=ess)
 
@@ -237,19 +255,27 @@ class ParticleEngine:
         blocked = why._replace(share_blocked=why.share_blocked + n_blocked / self.n_particles)
         return state._replace(filter=after, why=blocked, n_moves=state.n_moves + 1)
 
+    def _renewal(self, contradictions: int) -> tuple[float, bool]:
+        """Share of particles to draw afresh, and whether they keep to the floor of those they replace."""
+        rounds, rest = divmod(contradictions, self.recovery.patience)
+        is_reset = rounds > 0 and rest == 0
+        # the first time a track is lost, its floor may still be right where a barometer saw no change
+        return self.recovery.reset_share if is_reset else self.recovery.injection, not (
+            is_reset and rounds > 1
+        )
+
     def _renewed(
         self,
         key: tuple[int, int],
         state: FilterState,
         radio: Radio,
         near: Neighbours,
-        contradictions: int,
+        share: float,
         known: Known,
+        *,
+        keeps_floor: bool,
     ) -> FilterState:
         """Some particles drawn afresh: a few always, many where the scans have long contradicted the cloud."""
-        rounds, rest = divmod(contradictions, self.recovery.patience)
-        is_reset = rounds > 0 and rest == 0
-        share = self.recovery.reset_share if is_reset else self.recovery.injection
         n = round(share * self.n_particles)
         if n == 0:
             return state
@@ -258,8 +284,7 @@ class ParticleEngine:
         # distinct slots: a random start and an even stride over the resampled (hence equally weighted) particles
         start = noise.uniforms(1)[0, 0] * self.n_particles
         slots = (np.floor(start + np.arange(n) * (self.n_particles / n)).astype(np.int64)) % self.n_particles
-        if known.height and self.floor_change is not None and not (is_reset and rounds > 1):
-            # a barometer saw no change of floor: the place is the scan's, the floor stays
+        if keeps_floor:  # the place is the scan's, the floor stays
             fresh = fresh._replace(floor=state.cloud.floor[slots])
         return replace_particles(state._replace(draw=noise.draw), slots, fresh)
 
@@ -278,6 +303,8 @@ class ParticleEngine:
     def _hold(self, state: ParticleState) -> float:
         if state.movement.event is not None:
             return self.recovery.hold_moving
+        if state.n_walked < _UNCORROBORATED:
+            return self.recovery.hold_start
         return self.recovery.hold_height if state.height_known else self.recovery.hold
 
     @staticmethod

@@ -23,7 +23,9 @@ class Radio:
     particles from a scan. device : estimates how the phone's levels differ from the survey's, None = not at all.
     quiet_gain : multiplies the log-likelihood of a scan while no motion sensor speaks, for without steps the cloud
     forgets fast and the scan before says little. moving_gain : the same while a movement between floors is under way,
-    for the place of somebody on stairs is known to metres only.
+    for the place of somebody on stairs is known to metres only. usual_spacing : s between scans for which the
+    observation was tempered; the errors of scans closer to each other are more alike, so each counts less, in
+    proportion and by no more than a factor of ``spacing_range`` either way.
     """
 
     radio_map: SparseKnn
@@ -32,6 +34,8 @@ class Radio:
     device: DeviceOffset | None = None
     quiet_gain: float = 1.0
     moving_gain: float = 1.0
+    usual_spacing: float = 2.0
+    spacing_range: float = 2.0
 
     def neighbours(
         self, offset: OffsetState | None, fingerprint: Fingerprint
@@ -42,6 +46,7 @@ class Radio:
             fingerprint = shifted(fingerprint, self.device.shift(offset))
         return offset, self.radio_map.neighbours(fingerprint)
 
-    def gain(self, *, is_quiet: bool, is_moving: bool) -> float:
-        """Factor of a scan's log-likelihood."""
-        return (self.quiet_gain if is_quiet else 1.0) * (self.moving_gain if is_moving else 1.0)
+    def gain(self, spacing: float, *, is_quiet: bool, is_moving: bool) -> float:
+        """Factor of a scan's log-likelihood, ``spacing`` seconds after the scan before."""
+        fresh = min(max(spacing / self.usual_spacing, 1.0 / self.spacing_range), self.spacing_range)
+        return fresh * (self.quiet_gain if is_quiet else 1.0) * (self.moving_gain if is_moving else 1.0)
