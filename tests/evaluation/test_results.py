@@ -19,7 +19,7 @@ from wayfuse.evaluation.intervals import Bootstrap
 from wayfuse.evaluation.report import plain
 from wayfuse.evaluation.results import SECTIONS, absent, measure
 from wayfuse.evaluation.results_bars import at_least, at_most, within
-from wayfuse.evaluation.results_folds import Folds, gather, share_of, track_fold
+from wayfuse.evaluation.results_folds import FIRST, Folds, gather, share_of, track_fold
 from wayfuse.evaluation.results_ms_indoor import DEVELOPMENT, POOLED, measure_ms_indoor
 from wayfuse.evaluation.results_pool import comparison, figures, pool
 from wayfuse.evaluation.results_speed import measure_speed
@@ -103,12 +103,16 @@ def test_comparisons_pair_seed_with_seed(scores: list[Scores]) -> None:
 
 
 def test_all_figures_become_a_page(folds: Folds) -> None:
-    methods = ("fused", "fused --lag 5", "fused-barriers", "random-walk", "nnss", "pdr")
+    methods = ("fused", "fused --lag 5", FIRST, "fused-barriers", "random-walk", "nnss", "pdr")
     section = {"measured": True, **plain(measure_ms_indoor(folds, methods, (0, 1), DRAW))}
     json.dumps(section, allow_nan=False)
     assert list(section["figures"]) == [DEVELOPMENT, "fold 2", POOLED]
     assert list(section["figures"][POOLED]["waypoints"]) == list(methods)
-    assert len(section["bars"]) == 9
+    assert len(section["bars"]) == 11
+    above = next(b for b in section["bars"] if "first release" in b["what"] and POOLED in b["what"])
+    against = next(c for c in section["comparisons"][POOLED] if c["baseline"] == FIRST)
+    assert above["value"] == against["difference"]["mean"]["low"]
+    assert above["met"] == (above["value"] <= 0.0)
     text = page({"ms-indoor": section}, "1.2.3", "2000-01-01")
     assert "wayfuse 1.2.3 on 2000-01-01" in text
     assert "nan" not in text

@@ -102,8 +102,9 @@ def _tracking(section: Section) -> list[str]:
             f"once a second and at the waypoints, from the first Wi-Fi scan on. {particles} particles; seeds "
             f"{seeds} of the methods that draw random numbers are pooled (points are counted once; a replicate "
             "draws a walk with all its seeds), and the mean error of each seed is given. `fused-barriers` tests "
-            "walls as lines instead of the walkable mask. `pdr` is dead reckoning from the first waypoint, which "
-            "it is told; it is no rival."
+            "walls as lines instead of the walkable mask. `fused, first release` has the parameters from before "
+            "stairs, lifts and phones were modelled. `pdr` is dead reckoning from the first waypoint, which it is "
+            "told; it is no rival."
         ),
     ]
     for name, tables in section["figures"].items():

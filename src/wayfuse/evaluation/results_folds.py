@@ -9,7 +9,7 @@ for tests that nothing was chosen on. Each recording is read once; surveys are b
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from hashlib import sha256
 from pathlib import Path
 from typing import Any, Protocol, TypeVar
@@ -23,7 +23,7 @@ from wayfuse.formats.reading import expand, read
 from wayfuse.maps.importers.ms_indoor import import_site
 from wayfuse.maps.site import Site
 from wayfuse.models.survey_walk import place_of, survey_walk
-from wayfuse.presets import baselines
+from wayfuse.presets import baselines, fused
 from wayfuse.presets.methods import build_method
 from wayfuse.radio.survey import Survey
 from wayfuse.radio.walk_survey import SurveyWalk, survey_from_walks
@@ -31,18 +31,35 @@ from wayfuse.sensors.recording import Recording
 from wayfuse.tracking.dead_reckoning import Start
 from wayfuse.tracking.tracker import Tracker
 
-__all__ = ["FOLDS", "LAG", "METHODS", "SEEDS", "Folds", "Mapper", "build_tracker", "gather", "in_turn", "minutes_of",
-           "share_of", "track_fold"]  # fmt: skip
+__all__ = ["FIRST", "FOLDS", "LAG", "METHODS", "SEEDS", "Folds", "Mapper", "build_tracker", "gather", "in_turn",
+           "minutes_of", "share_of", "track_fold"]  # fmt: skip
 
 FOLDS = (1, 2, 3)  # the first is the development set
 SEEDS = (0, 1, 2)  # of the methods that draw random numbers
 LAG = 5.0  # s
 _SEALED = 0  # share that is neither tracked nor surveyed with
 _LAGGED = f"fused --lag {LAG:g}"
+FIRST = "fused, first release"
+# `fused` with the parameters it had before it knew of stairs, lifts and phones: what came since is to cost nothing
+# in a building without them
+_FIRST_CONFIG = replace(
+    fused.Config(),
+    kernel_limits=(4.0, 4.0),
+    background=0.05,
+    exponent=0.45,
+    heading_sigma=0.06,
+    bias_sigma=0.015,
+    first_bias_sigma=0.2,
+    first_scale_sigma=0.09,
+    injection=0.005,
+    device_offset=False,
+    use_vertical=False,
+)
 # name -> whether it draws random numbers
 METHODS: Mapping[str, bool] = {
     "fused": True,
     _LAGGED: True,
+    FIRST: True,
     "fused-no-map": True,
     "fused-barriers": True,
     "fused-no-steps": True,
@@ -147,6 +164,8 @@ def build_tracker(name: str, site: Site, survey: Survey) -> Tracker[Any]:
     """The tracker of a method of `METHODS` (``pdr`` has one per walk)."""
     if name == _LAGGED:
         return build_method("fused", site, survey, lag=LAG)
+    if name == FIRST:
+        return fused.build(site, survey, _FIRST_CONFIG)
     return build_method(name, site, survey)
 
 

@@ -10,6 +10,7 @@ from wayfuse.evaluation.errors import Scores
 from wayfuse.evaluation.intervals import Bootstrap
 from wayfuse.evaluation.results_bars import Bar, at_least, at_most, within
 from wayfuse.evaluation.results_folds import (
+    FIRST,
     FOLDS,
     LAG,
     METHODS,
@@ -27,7 +28,7 @@ __all__ = ["DEVELOPMENT", "POOLED", "measure_ms_indoor"]
 
 DEVELOPMENT = "development set"
 POOLED = "all folds pooled"
-_BASELINES = ("nnss", "wknn", "random-walk", "fused-no-map", "fused-barriers", "fused-no-steps", "fused-2.4ghz",
+_BASELINES = (FIRST, "nnss", "wknn", "random-walk", "fused-no-map", "fused-barriers", "fused-no-steps", "fused-2.4ghz",
               "fused-5ghz")  # fmt: skip
 _STATED = ("fused", f"fused --lag {LAG:g}", "random-walk")  # whose radii are looked at
 
@@ -118,6 +119,17 @@ def _bars(section: Mapping[str, Any]) -> list[Bar]:
             bars.append(
                 at_least(f"fused: mean error below {found['baseline']}", limit, r["value"], "%", low=r["low"])
             )
+    bars += [
+        at_most(
+            f"fused: mean error above the {FIRST.partition(', ')[2]}'s, lower end of the interval, {name}",
+            0.0,
+            found["difference"]["mean"]["low"],
+            "m",
+        )
+        for name, all_found in section["comparisons"].items()
+        for found in all_found
+        if found["baseline"] == FIRST
+    ]
     return bars + [
         within(
             f"fused: points within r95, {name}", 0.90, 0.98, c["fused"]["overall"]["within95"]["value"], "%"
