@@ -17,6 +17,7 @@ from wayfuse.filters.cloud import Cloud
 from wayfuse.filters.resampling import RESAMPLERS
 from wayfuse.inertial.front_end import StepEvent
 from wayfuse.models.constraint.barriers import Barriers
+from wayfuse.models.constraint.speed_filter import SpeedDisc
 from wayfuse.models.constraint.walkable_mask import WalkableMask
 from wayfuse.models.motion.pdr import PdrMotion, StepInput
 from wayfuse.models.motion.random_walk import RandomWalk
@@ -41,6 +42,7 @@ CONSTRAINTS: dict[str, Callable[[Any], Any]] = {
     "none to speak of": lambda site: Barriers(tuple(f.barrier_index for f in site.floors), 0.0),
     "barriers": lambda site: Barriers(tuple(f.barrier_index for f in site.floors)),
     "walkable": lambda site: WalkableMask(tuple(f.walkable for f in site.floors)),
+    "speed": lambda site: SpeedDisc(0.5 * site.floors[1].width, 0.5 * site.floors[1].height, 1, 8.0),
 }
 OBSERVATIONS: dict[str, Callable[[Any], Any]] = {
     "mixture": lambda _: FingerprintLikelihood(),
