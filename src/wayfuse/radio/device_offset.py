@@ -103,7 +103,14 @@ class DeviceOffset:
         state = state._replace(n_seen=state.n_seen + 1)
         if state.n_seen > self.burn_in and state.n_seen % self.every:
             return state
-        bssid, rssi, frequency = fingerprint
+        known = radio_map.survey.columns(fingerprint.bssid) >= 0  # strangers must not crowd out the others
+        if not np.any(known):  # a scan of unknown access points says nothing
+            return state
+        bssid, rssi, frequency = (
+            fingerprint.bssid[known],
+            fingerprint.rssi[known],
+            fingerprint.frequency[known],
+        )
         if len(rssi) > self.strongest:
             loud = np.sort(np.argsort(-rssi, kind="stable")[: self.strongest])
             bssid, rssi, frequency = bssid[loud], rssi[loud], frequency[loud]
@@ -115,9 +122,8 @@ class DeviceOffset:
             trial = np.where((band == b)[:, None], grid, mean[band][:, None])
             levels = (rssi[:, None] + trial).astype(np.float32)
             distance = radio_map.mean_distances(bssid, levels, self.k)
-            if distance is None:  # a scan of unknown access points says nothing
-                return state
-            added[b] = distance
+            if distance is not None:
+                added[b] = distance
         prior = self.init().cost
         fade = np.exp(-1.0 / self.memory)
         gain = (added - added.min(axis=1, keepdims=True)) / self.temperature
