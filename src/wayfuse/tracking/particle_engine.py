@@ -24,6 +24,7 @@ from wayfuse.models.motion.pdr import PdrMotion, StepInput
 from wayfuse.models.motion.random_walk import RandomWalk
 from wayfuse.radio.device_offset import OffsetState
 from wayfuse.radio.sparse_knn import Neighbours
+from wayfuse.radio.standing import Standing
 from wayfuse.radio.survey import Fingerprint
 from wayfuse.tracking.engine import Known, Why, unknown
 from wayfuse.tracking.estimate import Estimate, State
@@ -83,6 +84,7 @@ class ParticleState(NamedTuple):
     height_known: bool = False
     scanned: float = -np.inf
     n_walked: int = 0
+    standing: Standing | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -161,7 +163,9 @@ class ParticleEngine:
                 state.key, state.filter, after, state.movement, event.t, step
             )
             state = state._replace(movement=movement)
-        return self._moved(state, after, n_blocked, why)._replace(is_quiet=False, n_walked=state.n_walked + 1)
+        return self._moved(state, after, n_blocked, why)._replace(
+            is_quiet=False, n_walked=state.n_walked + 1, standing=None
+        )
 
     def on_vertical(self, state: ParticleState, event: VerticalEvent) -> ParticleState:
         """Take the cloud over stairs or by lift; before the first scan there is nothing to take."""
@@ -183,11 +187,15 @@ class ParticleEngine:
         """Weigh by a scan; the first one makes the cloud. A scan of unknown access points changes nothing."""
         if self.radio is None:
             return state
+        standing = Standing.of(fingerprint)
+        if state.standing is not None and self.uses_steps and not state.is_quiet:
+            standing = state.standing.add(fingerprint)
+        fingerprint = standing.fingerprint
         offset, near = self.radio.neighbours(state.offset, fingerprint)
         if near is None:
             return state
         why = state.why._replace(n_aps=max(state.why.n_aps, near.n_aps))
-        state = state._replace(offset=offset, height_known=known.height, why=why)
+        state = state._replace(standing=standing, offset=offset, height_known=known.height, why=why)
         if state.filter is None:
             noise = Noise(state.key)
             cloud = self.radio.first.draw(noise, near, self.n_particles, heading_known=known.heading)
