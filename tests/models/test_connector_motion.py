@@ -20,7 +20,7 @@ from wayfuse.maps.site import Polygon, Site
 from wayfuse.models.motion.connectors import UNLISTED, ConnectorMotion
 
 ELEVATION = (0.0, 4.0, 8.0)
-STAIRS, EXPRESS, LIFT, ESCALATOR, RAMP = range(5)  # connectors of `house`
+STAIRS, EXPRESS, LIFT, ESCALATOR, RAMP, LOCAL = range(6)  # connectors of `house`
 # landings are apart by floors, so that places on the way can be told from places on a floor
 CONNECTORS = (
     Connector(
@@ -30,6 +30,11 @@ CONNECTORS = (
     Connector("lift", ConnectorKind.LIFT, (Landing(0, 70.0, 5.0), Landing(2, 70.0, 5.0))),
     Connector("escalator", ConnectorKind.ESCALATOR, (Landing(0, 10.0, 35.0), Landing(1, 18.0, 35.0)), (), 1),
     Connector("ramp", ConnectorKind.RAMP, (Landing(0, 40.0, 35.0), Landing(1, 60.0, 35.0))),
+    Connector(
+        "local lift",
+        ConnectorKind.LIFT,
+        (Landing(0, 80.0, 35.0), Landing(1, 80.0, 35.0), Landing(2, 80.0, 35.0)),
+    ),
 )
 CORNER = ((0.0, 0.0), (5.0, -3.0), (-2.0, 4.0))  # m, of the floors' frames, in that of the lowest
 
@@ -328,6 +333,29 @@ def test_at_a_floor_between_people_have_arrived_and_do_not_rest(motion: Connecto
         assert not np.any(motion.is_half_way(out))
         off = np.hypot(out.x - 14.0, out.y - 5.0)[out.floor == 1]
         assert off.max() < 6 * motion.scatter
+
+
+def test_who_rests_does_so_where_the_last_report_says(motion: ConnectorMotion) -> None:
+    way = motion.ride(aboard(STAIRS, 0, 0.0, 2000), event(1.7))
+    out, _ = ended(motion, way, event(2.5, over=True))
+    rests = motion.is_half_way(out)
+    assert rests.mean() > 0.5
+    np.testing.assert_allclose(out.x[rests], 12.5, atol=1e-4)
+    assert np.all(out.floor[rests] == 1)
+
+
+def test_in_a_lift_nobody_is_on_a_floor_it_passes(motion: ConnectorMotion) -> None:
+    cloud, seen = aboard(LOCAL, 0, 0.0), set()
+    for rise in np.arange(0.0, 8.1, 0.25).tolist():
+        cloud = motion.ride(cloud, event(rise, Behaviour.LIFT))
+        seen |= set(cloud.floor.tolist())
+    assert seen == {0, 2}
+    down = motion.ride(aboard(LOCAL, 1, 4.0), event(-3.9, Behaviour.LIFT))
+    assert set(down.floor.tolist()) == {0}
+    half = motion.ride(aboard(LOCAL, 0, 0.0, 1000), event(4.1, Behaviour.LIFT))
+    out, weights = ended(motion, half, event(4.1, Behaviour.LIFT, over=True))
+    assert np.mean(out.floor == 1) > 0.99  # where it stopped
+    assert np.all(weights > -0.1)
 
 
 def test_settled_are_on_the_nearest_floor_and_others_stay(motion: ConnectorMotion) -> None:

@@ -147,6 +147,7 @@ class ConnectorMotion:
     def end(self, noise: Noise, cloud: Cloud, event: VerticalEvent, log_weights: Array) -> Cloud:
         """Those aboard are on a floor of their connector, or half-way; weights get the agreement with the rise."""
         z, u = noise.normals(cloud.n), noise.uniforms(cloud.n)[0]
+        cloud = self.ride(cloud, event)  # who rests does so where the last report puts them
         x, y, floor, base = cloud.x.copy(), cloud.y.copy(), cloud.floor.copy(), cloud.base.copy()
         aboard = np.flatnonzero(cloud.connector != NO_CONNECTOR)
         for rows, (c, start) in _groups(aboard, cloud.connector, cloud.base):
