@@ -18,7 +18,7 @@ __all__ = ["LazyGroup", "cli", "main"]
 
 # name -> (module:attribute, the line that help shows)
 COMMANDS: dict[str, tuple[str, str]] = {
-    "site": ("wayfuse.cli.site:site", "Import and draw buildings."),
+    "site": ("wayfuse.cli.site:site", "Import, check and draw buildings; find ways through them."),
     "survey": ("wayfuse.cli.survey:survey", "Build radio maps from recordings with waypoints."),
     "track": ("wayfuse.cli.track:track", "Track recordings through a site."),
     "evaluate": ("wayfuse.cli.evaluate:evaluate", "Score estimates against the waypoints of recordings."),
