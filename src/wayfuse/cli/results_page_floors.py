@@ -176,8 +176,9 @@ def _phones(rows: Sequence[Section]) -> list[str]:
     ]
     return [
         (
-            "Shift added to the levels of a phone, as estimated by the end of a recording: mean and standard deviation"
-            " over recordings. The surveys are at the levels of the phone named above."
+            "Shift added to the levels of a phone, as the estimator of the tracker gives it by the end of a recording "
+            "from its scans alone: mean and standard deviation over recordings. The surveys are at the levels of the "
+            "phone named above."
         ),
         table(["repetition", "phone", "recordings", "2.4 GHz (dB)", "5 GHz (dB)"], shown),
     ]
