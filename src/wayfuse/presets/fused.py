@@ -8,7 +8,7 @@ particle filter), chu2009 (floor plan as constraint), li2015 (step length per pa
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
@@ -55,6 +55,8 @@ BAND_5 = ((4900, 5925),)
 
 
 # radius = offset + scale * quantile of the cloud, by quantile regression of the error at 1 Hz on the three folds
+# (ms-indoor); the offsets go in proportion to the accuracy of the survey, which was 2.5 m there
+CALIBRATED_AT = 2.5
 CALIBRATED = Summary(offset_68=0.84, scale_68=0.89, offset_95=1.73, scale_95=1.06)
 
 
@@ -131,7 +133,7 @@ def build(
         quiet_gain=c.quiet_exponent / c.exponent,
         moving_gain=c.moving_gain,
     )
-    return _tracker(site, c, radio, start, lag)
+    return _tracker(site, replace(c, summary=_scaled(c.summary, survey)), radio, start, lag)
 
 
 def build_from_start(
@@ -188,6 +190,13 @@ def _tracker(
 
 def _walkable(site: Site, c: Config) -> tuple[Walkable, ...]:
     return tuple(floor.walkable for floor in site.floors) if c.map_constraint != "none" else ()
+
+
+def _scaled(summary: Summary, survey: Survey) -> Summary:
+    if not math.isfinite(survey.accuracy):
+        return summary
+    share = float(np.clip(survey.accuracy / CALIBRATED_AT, 0.3, 2.0))
+    return replace(summary, offset_68=share * summary.offset_68, offset_95=share * summary.offset_95)
 
 
 def _kernel(survey: Survey, c: Config) -> float:
