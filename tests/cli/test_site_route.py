@@ -135,7 +135,8 @@ def test_validate_ends_with_one_where_there_are_errors(saved, run_cli):
 
 
 def test_the_graph_and_the_connectors_are_drawn(saved, run_cli, tmp_path):
-    from wayfuse.evaluation.plot_graph import draw_connectors, draw_graph, served_floors
+    from wayfuse.evaluation.plot_connectors import draw_connectors, served_floors
+    from wayfuse.evaluation.plot_graph import draw_graph
     from wayfuse.evaluation.plot_site import floor_figure
     from wayfuse.maps.graph import build_graph
 

@@ -84,7 +84,8 @@ def import_command(plan_format: str, path: Path, out: Path, overwrite: bool, as_
 )
 def show_command(folder: Path, names: tuple[str, ...], out: Path | None, svg: bool, with_graph: bool) -> None:
     """Draw each floor of SITE with its stairs and lifts, and print the paths of the pictures."""
-    from wayfuse.evaluation.plot_graph import draw_connectors, draw_graph
+    from wayfuse.evaluation.plot_connectors import draw_connectors
+    from wayfuse.evaluation.plot_graph import draw_graph
     from wayfuse.evaluation.plot_site import floor_figure, save_figure
     from wayfuse.maps.graph import build_graph
     from wayfuse.maps.site import Site

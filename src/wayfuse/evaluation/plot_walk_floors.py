@@ -76,8 +76,9 @@ def floors_figure(scores: Scores, walk: str, names: list[str], site: Site | None
         ax = figure.add_subplot(panels[0, k])
         shift = shift_to(scores, name)
         draw_plan(ax, site, name, truth, (low + shift, high + shift))
-        if site is not None and truth.plane is None:
-            draw_connectors(ax, site, name)
+        known = [] if site is None else [n.casefold() for n in site.floor_names]
+        if site is not None and truth.plane is None and name.casefold() in known:
+            draw_connectors(ax, site, known.index(name.casefold()), brief=True)
         draw_truth(ax, truth, name, shift)
         for index, method in enumerate(scores.methods):
             _estimates(ax, scores, method, index, truth, name)
