@@ -1,8 +1,9 @@
-"""``fused``: Wi-Fi fingerprints, steps and the floor plan in one particle filter; and its parts as baselines.
+"""``fused``: Wi-Fi fingerprints, steps, stairs, lifts and floor plans in one particle filter; and its parts as baselines.
 
-Every number was chosen on three development folds of ms-indoor site1 (h == 1, 2, 3; survey = all other walks),
-pooled; `wayfuse results` prints what each part is worth there. Source papers: he2014 (steps and radio map in a
-particle filter), chu2009 (floor plan as constraint), li2015 (step length per particle).
+One set of numbers for all buildings, chosen on two together: three development folds of ms-indoor site1 (h == 1, 2, 3;
+survey = all other walks; a mall) and ipin2023-track3 (leave one repetition out; a museum). `wayfuse results` prints
+what each part is worth there. Source papers: he2014 (steps and radio map in a particle filter), chu2009 (floor plan,
+stairs and lifts), li2015 (step length per particle).
 """
 
 from __future__ import annotations
@@ -77,8 +78,8 @@ class Config:
     exponent: float = 0.4  # tempering: errors of successive scans are much alike
     coverage_gain: float = 1.5  # nats
     length_sigma: float = 0.15  # relative, per step
-    heading_sigma: float = 0.08  # rad, per step
-    bias_sigma: float = 0.035  # rad, per step
+    heading_sigma: float = 0.06  # rad, per step
+    bias_sigma: float = 0.025  # rad, per step
     scale_sigma: float = 0.006  # per step
     first_bias_sigma: float = 0.3  # rad; rotation vector against truth: 0.17 between walks
     first_scale_sigma: float = 0.08  # per-walk mean step against the model

@@ -33,8 +33,8 @@ class Standing(NamedTuple):
     def of(cls, fingerprint: Fingerprint) -> Standing:
         """After the first scan."""
         order = np.argsort(fingerprint.bssid, kind="stable")
-        bssid, rssi, frequency = (column[order] for column in fingerprint)
-        return cls(bssid, frequency, np.ones(len(bssid), np.float32), rssi, 1.0)
+        bssid, rssi = fingerprint.bssid[order], fingerprint.rssi[order]
+        return cls(bssid, fingerprint.frequency[order], np.ones(len(bssid), np.float32), rssi, 1.0)
 
     def add(self, fingerprint: Fingerprint, memory: float = 5.0) -> Standing:
         """After another scan; older ones fade with 1/``memory`` per scan."""

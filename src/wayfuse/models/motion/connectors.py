@@ -63,9 +63,9 @@ class ConnectorMotion:
     false_alarm : odds of staying on the floor. unlisted : odds of an unlisted connector; ``unlisted_alone`` where the
     site has no connector at all. other_kind, like_kind : odds k of connectors of another kind than reported.
     elevation_sigma : m, error of a site's elevations; ``elevation_relative`` of their differences, as a share.
-    half_way : odds of resting on the stairs when a movement ends. hysteresis : m a particle must be nearer another
-    floor before it counts as there. scatter : m, where people stand when they arrive. leave_stairs, leave_lift : chance
-    to leave a connector at a step.
+    half_way : odds of resting on the stairs when a movement ends; turn_back : of ending on the floor it began on.
+    hysteresis : m a particle must be nearer another floor before it counts as there. scatter : m, where people stand
+    when they arrive. leave_stairs, leave_lift : chance to leave a connector at a step.
     """
 
     site: Site
@@ -79,6 +79,7 @@ class ConnectorMotion:
     elevation_sigma: float = 0.4
     elevation_relative: float = 0.08
     half_way: float = 0.3
+    turn_back: float = 0.1
     hysteresis: float = 0.3
     scatter: float = 0.7
     leave_stairs: float = 0.2
@@ -153,6 +154,7 @@ class ConnectorMotion:
         for rows, (c, start) in _groups(aboard, cloud.connector, cloud.base):
             served = self._served(int(c))
             logits = self._agreement(self._elevation[served] - start, event.rise, event.sigma)
+            logits[np.abs(self._elevation[served] - start) < _AT_A_FLOOR] += np.log(self.turn_back)
             if c != UNLISTED and self._can_rest(int(c), start + event.rise):
                 logits = np.append(logits, np.log(self.half_way))
             log_weights[rows] += logits.max()
