@@ -36,6 +36,7 @@ def test_the_floor_at_the_end_is_drawn_by_how_well_it_agrees(motion: ConnectorMo
     z = np.array(ELEVATION)
     sd = np.hypot(sigma, motion.elevation_sigma + motion.elevation_relative * z)
     logits = np.append(np.maximum(-0.5 * ((z - rise) / sd) ** 2, -8.0), np.log(motion.half_way))
+    logits[0] += np.log(motion.turn_back)  # where they began
     share = np.exp(logits) / np.exp(logits).sum()
     rests = np.isclose(out.base, rise)
     found = np.array([*(np.mean((out.floor == f) & ~rests) for f in range(3)), rests.mean()])

@@ -1,4 +1,4 @@
-"""``fused``: Wi-Fi fingerprints, steps, stairs, lifts and floor plans in one particle filter; and its parts as baselines.
+"""``fused``: Wi-Fi fingerprints, steps, stairs, lifts and floor plans in one particle filter; and it without parts.
 
 One set of numbers for all buildings, chosen on two together: three development folds of ms-indoor site1 (h == 1, 2, 3;
 survey = all other walks; a mall) and ipin2023-track3 (leave one repetition out; a museum). `wayfuse results` prints
