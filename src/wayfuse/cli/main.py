@@ -25,6 +25,10 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "datasets": ("wayfuse.cli.datasets:datasets", "List, fetch and verify public data sets."),
     "inspect": ("wayfuse.cli.inspect:inspect", "Say what a recording holds and what was wrong with it."),
     "demo": ("wayfuse.cli.demo:demo", "Run the whole pipeline on a simulated site."),
+    "reproduce": (
+        "wayfuse.cli.reproduce:reproduce",
+        "Run the experiments of the papers, paper against ours.",
+    ),
     "results": ("wayfuse.cli.results:results", "Measure every figure of docs/results.md anew."),
     "warmup": ("wayfuse.cli.warmup:warmup", "Compile the kernels once, so that tracking starts at once."),
 }

@@ -12,7 +12,7 @@ import click
 if TYPE_CHECKING:
     from wayfuse.evaluation.results_folds import Mapper
 
-__all__ = ["results"]
+__all__ = ["make_mapper", "results"]
 
 S = TypeVar("S")
 T = TypeVar("T")
@@ -51,7 +51,7 @@ def results(
 
     for target in (out, *([json_file] if json_file else [])):
         check_target(target)
-    sections = measure(data or data_root(), only, _mapper(jobs))
+    sections = measure(data or data_root(), only, make_mapper(jobs))
     if json_file is not None:
         document = {"version": __version__, "date": date, "sections": sections}
         json_file.write_text(json.dumps(document, indent=1, allow_nan=False) + "\n", encoding="utf-8")
@@ -60,7 +60,8 @@ def results(
     _tell(sections)
 
 
-def _mapper(jobs: int | None) -> Mapper:
+def make_mapper(jobs: int | None) -> Mapper:
+    """What works through items in processes, with a progress bar."""
     from wayfuse.cli.work import map_recordings
 
     def run(work: Callable[[S], T], items: Sequence[S], label: str, /) -> Iterator[T]:

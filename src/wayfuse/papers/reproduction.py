@@ -1,0 +1,97 @@
+"""What the reproduction of a paper is made of: tables of paper against ours, bars, and words.
+
+A file of this room named as its preset has three things: ``PAGE``, the words of docs/papers/<preset>.md (equation,
+function, test; departures and misprints; why figures differ), ``SEEDS``, how many seeds its figures take, and
+``reproduce(seeds, mapper)``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, field
+from importlib import import_module
+from typing import Any, Protocol, cast
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from wayfuse.core.errors import UsageError
+from wayfuse.evaluation.results_bars import Bar
+from wayfuse.evaluation.results_folds import Mapper
+
+__all__ = ["PAPERS", "Interval", "Paper", "Reproduction", "Table", "mean_interval", "paper"]
+
+PAPERS = ("chu2009", "he2014", "karlsson2015", "li2015", "liu2017")
+_STUDENT = 1.645  # of a normal: two sides, 90 %; with 20 seeds and more Student's differs by less than 5 %
+
+
+@dataclass(frozen=True, slots=True)
+class Interval:
+    """A mean over seeds and the ends of the 90 % interval of that mean."""
+
+    value: float
+    low: float
+    high: float
+
+    def __str__(self) -> str:
+        return f"{self.value:.2f} [{self.low:.2f}, {self.high:.2f}]"
+
+
+def mean_interval(values: ArrayLike) -> Interval:
+    """Mean over seeds (n,) with the 90 % interval of the mean; one seed has no interval."""
+    v = np.asarray(values, dtype=np.float64)
+    half = _STUDENT * float(v.std(ddof=1)) / np.sqrt(len(v)) if len(v) > 1 else 0.0
+    return Interval(float(v.mean()), float(v.mean() - half), float(v.mean() + half))
+
+
+@dataclass(frozen=True, slots=True)
+class Table:
+    """Paper against ours. Cells: text, numbers (two decimals), intervals. note : what was fitted, what is a test."""
+
+    title: str
+    columns: tuple[str, ...]
+    rows: tuple[tuple[str | float | Interval, ...], ...]
+    note: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Reproduction:
+    """Everything measured for one paper. lost : runs that lost the track, by row; they are never dropped."""
+
+    preset: str
+    seeds: tuple[int, ...]
+    tables: tuple[Table, ...]
+    bars: tuple[Bar, ...]
+    lost: tuple[str, ...] = field(default=())
+
+    def plain(self) -> dict[str, Any]:
+        """As plain values for JSON."""
+        return asdict(self)
+
+
+class Paper(Protocol):
+    """A module of this room."""
+
+    PAGE: str
+    SEEDS: int
+
+    def reproduce(self, seeds: Sequence[int], mapper: Mapper) -> Reproduction:
+        """Run the experiments of the paper with each seed."""
+        ...
+
+
+def paper(name: str) -> Paper:
+    """The module of a preset.
+
+    Raises
+    ------
+    UsageError : there is no such paper, or it is not reproduced yet.
+    """
+    if name not in PAPERS:
+        raise UsageError(f"no paper {name!r}", where="PRESET", remedy=f"one of {', '.join(PAPERS)}")
+    try:
+        return cast("Paper", import_module(f"wayfuse.papers.{name}"))
+    except ModuleNotFoundError as error:
+        if error.name != f"wayfuse.papers.{name}":
+            raise
+        raise UsageError(f"{name} is not reproduced yet", where="PRESET", remedy="choose another") from error
