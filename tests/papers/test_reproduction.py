@@ -44,7 +44,7 @@ def test_an_unknown_paper_is_an_error_that_lists_the_known() -> None:
 def test_the_command_prints_tables_and_bars(
     limit: float, code: int, run_cli: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(reproduction, "paper", lambda name: made_up(limit))
+    monkeypatch.setattr(reproduction, "paper", lambda _: made_up(limit))
     said = run_cli(
         "reproduce", "liu2017", "--out", str(tmp_path), "--json", str(tmp_path / "x.json"), "--jobs", "1"
     )
