@@ -60,7 +60,7 @@ METHODS: dict[str, Callable[[Any], Any]] = {
         scheme: (lambda w, s=scheme: fused.build(w.site, w.survey, replace(FEW, resampling=s)))
         for scheme in RESAMPLERS
     },
-    "no injection": lambda w: fused.build(w.site, w.survey, replace(FEW, injection=0.0)),
+    "no injection": lambda w: fused.build(w.site, w.survey, replace(FEW, injection=0.0, injection_least=0.0)),
     "random walk": lambda w: fused.build(w.site, w.survey, replace(baselines.RANDOM_WALK, n_particles=N)),
     "wknn": lambda w: baselines.wknn(w.site, w.survey),
     "nnss": lambda w: baselines.nnss(w.site, w.survey),

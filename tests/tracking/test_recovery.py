@@ -91,7 +91,7 @@ def test_a_kidnapped_phone_is_found_on_the_other_floor(world: Any, jump: Jump) -
 def test_without_fresh_particles_it_would_not_be_found(world: Any, jump: Jump) -> None:
     recording, _, then, shift = jump
     tracker = fused.build(world.site, world.survey)
-    engine = replace(tracker.engine, recovery=Recovery(injection=0.0, reset_share=0.0))
+    engine = replace(tracker.engine, recovery=Recovery(injection=0.0, injection_least=0.0, reset_share=0.0))
     estimates = replace(tracker, engine=engine).run(recording).estimates
     assert np.all(np.isinf(errors(world, estimates[-10:], then, shift)))
 
@@ -100,7 +100,9 @@ def test_while_lost_it_says_so(world: Any, jump: Jump) -> None:
     recording, _, then, shift = jump
     tracker = fused.build(world.site, world.survey)
     # no fresh particles at each scan: only the contradiction itself can help
-    engine = replace(tracker.engine, recovery=Recovery(injection=0.0, patience=3, reset_share=0.5))
+    engine = replace(
+        tracker.engine, recovery=Recovery(injection=0.0, injection_least=0.0, patience=3, reset_share=0.5)
+    )
     estimates = replace(tracker, engine=engine).run(recording).estimates
     moment = then.span[0] + shift
     lost = [e.t for e in estimates if e.state is State.LOST]
@@ -149,7 +151,7 @@ def test_a_cloud_that_spreads_is_lost_once_it_was_settled(world: Any) -> None:
 
 
 def test_parameters_out_of_range_are_refused() -> None:
-    for bad in ({"injection": 1.0}, {"injection": -0.1}, {"reset_share": 1.5}, {"patience": 0}):
+    for bad in ({"injection": 1.1}, {"injection": -0.1}, {"reset_share": 1.5}, {"patience": 0}):
         with pytest.raises(ConfigError, match="shares, patience"):
             Recovery(**bad)
 

@@ -51,7 +51,8 @@ _FIRST_CONFIG = replace(
     bias_sigma=0.015,
     first_bias_sigma=0.2,
     first_scale_sigma=0.09,
-    injection=0.005,
+    injection=0.0,
+    injection_least=0.005,
     device_offset=False,
     use_vertical=False,
 )

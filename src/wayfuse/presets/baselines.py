@@ -26,7 +26,8 @@ RANDOM_WALK = Config(
     exponent=2.0,
     background=0.05,
     coverage_gain=0.0,
-    injection=0.01,
+    injection=0.0,
+    injection_least=0.01,
 )
 
 

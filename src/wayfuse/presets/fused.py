@@ -83,7 +83,8 @@ class Config:
     scale_sigma: float = 0.006  # per step
     first_bias_sigma: float = 0.3  # rad; rotation vector against truth: 0.17 between walks
     first_scale_sigma: float = 0.08  # per-walk mean step against the model
-    injection: float = 0.02  # share of particles per scan
+    injection: float = 0.04  # share of particles per scan that the cloud does not agree with
+    injection_least: float = 0.002  # per scan that it does
     penalty: float = 1.2  # nats per blocked move
     diffusion: float = 4.0  # m per root second and axis, where motion sensors are silent
     quiet_exponent: float = 2.0  # tempering there; both as the random walk tuned for itself
@@ -177,7 +178,7 @@ def _tracker(
         diffusion=RandomWalk(c.diffusion),
         constraint=constraint,
         filter=particle_filter,
-        recovery=Recovery(injection=c.injection),
+        recovery=Recovery(injection=c.injection, injection_least=c.injection_least),
         summary=c.summary,
         floor_change=floor_change if c.use_vertical and len(site.floors) > 1 else None,
         walkable=_walkable(site, c),

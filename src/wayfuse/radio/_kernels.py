@@ -86,6 +86,11 @@ def nearest_mean_distances(
                 overlap[r, s] += w * (u if u < v else v)
     best[:] = np.float32(1.0)
     for r in range(n):
+        heard = np.float32(0.0)
+        for s in range(versions):
+            heard = max(heard, overlap[r, s])
+        if heard == np.float32(0.0):  # nothing in common: distance 1, which is where best began
+            continue
         for s in range(versions):
             d = np.float32(1.0) - np.float32(2.0) * overlap[r, s] / (row_sum[r] + total[s])
             if d < best[s, k - 1]:

@@ -39,15 +39,17 @@ __all__ = ["ParticleEngine", "ParticleState", "Recovery"]
 class Recovery:
     """When a track is settled, lost, and what is done about it.
 
-    injection : share of particles drawn afresh at each scan. agreement : a scan contradicts the cloud when the cloud's
-    mean likelihood is below this share of what the scan's own neighbours have. patience : scans in a row until the
-    track is lost and ``reset_share`` of the particles are drawn afresh. hold, hold_start, hold_height, hold_moving :
-    share of the weight that keeps the floor said before: on a floor; before the first few steps; where a barometer
-    would have told of a change; on stairs or in a lift. settled : m, r95 below which a track is no longer
-    initialising. lost : m, r95 above which a settled track is lost.
+    injection : share of particles drawn afresh at a scan with which the cloud does not agree at all; it falls with the
+    square of the disagreement to ``injection_least`` (as the sensor resetting of Monte Carlo localisation).
+    agreement : a scan contradicts the cloud when the cloud's mean likelihood is below this share of what the scan's
+    own neighbours have. patience : scans in a row until the track is lost and ``reset_share`` of the particles are
+    drawn afresh. hold, hold_start, hold_height, hold_moving : share of the weight that keeps the floor said before: on
+    a floor; before the first few steps; where a barometer would have told of a change; on stairs or in a lift.
+    settled : m, r95 below which a track is no longer initialising. lost : m, r95 above which a settled track is lost.
     """
 
-    injection: float = 0.003
+    injection: float = 0.04
+    injection_least: float = 0.002
     agreement: float = 0.02
     patience: int = 3
     reset_share: float = 0.5
@@ -59,8 +61,18 @@ class Recovery:
     lost: float = 60.0
 
     def __post_init__(self) -> None:
-        if not (0.0 <= self.injection < 1.0 and 0.0 <= self.reset_share <= 1.0 and self.patience >= 1):
+        shares = (self.injection, self.injection_least, self.reset_share)
+        if not (all(0.0 <= share <= 1.0 for share in shares) and self.patience >= 1):
             raise ConfigError("injection and reset_share are shares, patience at least 1", where="Recovery")
+
+    @property
+    def injects(self) -> bool:
+        """Whether particles are drawn afresh at every scan."""
+        return self.injection + self.injection_least > 0.0
+
+    def injection_share(self, agreement: float) -> float:
+        """Share of particles to draw afresh at a scan the cloud agrees with so much (about 0 to 1)."""
+        return self.injection_least + self.injection * (1.0 - min(agreement, 1.0)) ** 2
 
 
 _UNCORROBORATED = 10  # steps before which no walk has told the floors apart
@@ -218,13 +230,13 @@ class ParticleEngine:
         agreement = radio.observation.agreement(now.weights, log_likelihood, near)
         is_moving = state.movement.event is not None  # nobody is drawn afresh onto stairs or into a lift
         log_likelihood *= radio.gain(spacing, is_quiet=state.is_quiet, is_moving=is_moving)
-        inject = self.recovery.injection > 0.0 and not is_moving
+        inject = self.recovery.injects and not is_moving
         after, info = self.filter.update(state.key, now, log_likelihood, always_resample=inject)
         contradicts = agreement < self.recovery.agreement and not is_moving
         contradictions = state.contradictions + 1 if contradicts else 0
         if not is_moving:
             keeps = self.floor_change is not None and known.height and state.n_walked >= _UNCORROBORATED
-            share, keeps_floor = self._renewal(contradictions)
+            share, keeps_floor = self._renewal(contradictions, agreement)
             after = self._renewed(
                 state.key, after, radio, near, share, known, keeps_floor=keeps and keeps_floor
             )
@@ -263,14 +275,15 @@ class ParticleEngine:
         blocked = why._replace(share_blocked=why.share_blocked + n_blocked / self.n_particles)
         return state._replace(filter=after, why=blocked, n_moves=state.n_moves + 1)
 
-    def _renewal(self, contradictions: int) -> tuple[float, bool]:
+    def _renewal(self, contradictions: int, agreement: float) -> tuple[float, bool]:
         """Share of particles to draw afresh, and whether they keep to the floor of those they replace."""
         rounds, rest = divmod(contradictions, self.recovery.patience)
         is_reset = rounds > 0 and rest == 0
         # the first time a track is lost, its floor may still be right where a barometer saw no change
-        return self.recovery.reset_share if is_reset else self.recovery.injection, not (
-            is_reset and rounds > 1
-        )
+        keeps_floor = not (is_reset and rounds > 1)
+        if is_reset:
+            return self.recovery.reset_share, keeps_floor
+        return self.recovery.injection_share(agreement), keeps_floor
 
     def _renewed(
         self,
