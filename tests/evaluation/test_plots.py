@@ -10,13 +10,13 @@ from matplotlib.figure import Figure
 
 from wayfuse.core.errors import UsageError
 from wayfuse.evaluation.errors import Scores, score
+from wayfuse.evaluation.plot_look import style
 from wayfuse.evaluation.plot_walk import walk_figure
 from wayfuse.evaluation.plots import (
     calibration_figure,
     cdf_figure,
     choose_walks,
     error_by_time_figure,
-    style,
     write_plots,
 )
 from wayfuse.maps.build import build_floor

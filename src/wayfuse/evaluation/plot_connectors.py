@@ -54,7 +54,8 @@ def draw_connectors(
             written.append((c, x, y))
     if brief:
         for c, x, y in written:
-            ax.annotate(served_floors(site, c, floor), (x, y), (0, -0.75 * SIZE), textcoords="offset points",
+            leads = ", ".join(site.floor_names[k] for k in c.floors if k != floor)
+            ax.annotate(f"to {leads}", (x, y), (0, -0.75 * SIZE), textcoords="offset points",
                         ha="center", va="top", fontsize=6.5, color=COLOURS[c.kind], zorder=ABOVE - 1,
                         annotation_clip=True, parse_math=False,
                         bbox={"boxstyle": "round,pad=0.1", "fc": "white", "ec": "none", "alpha": 0.85})  # fmt: skip

@@ -15,7 +15,8 @@ import numpy as np
 from wayfuse.core.types import Array
 from wayfuse.evaluation.errors import MethodScores, Scores, places_in_frame
 from wayfuse.evaluation.plot_connectors import draw_connectors
-from wayfuse.evaluation.plot_walk import (
+from wayfuse.evaluation.plot_look import FAINT, INK, new_figure, shown, style
+from wayfuse.evaluation.plot_walk_parts import (
     OVER,
     ROW,
     TRUTH,
@@ -31,7 +32,6 @@ from wayfuse.evaluation.plot_walk import (
     walk_title,
     window,
 )
-from wayfuse.evaluation.plots import FAINT, INK, new_figure, shown, style
 from wayfuse.evaluation.truth import Truth
 
 if TYPE_CHECKING:

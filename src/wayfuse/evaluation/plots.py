@@ -1,8 +1,4 @@
-"""Pictures of a scoring: distribution of errors, error and calibration over time, and one picture per walk.
-
-Colours are Okabe and Ito's, told apart with any colour vision; lines differ in dash too. No pyplot: no
-display and no global state. The Agg canvas makes the same file from the same figures.
-"""
+"""Pictures of a scoring: distribution of errors, error and calibration over time, and one picture per walk."""
 
 from __future__ import annotations
 
@@ -18,6 +14,7 @@ from wayfuse.core.errors import UsageError
 from wayfuse.core.types import Array
 from wayfuse.evaluation.calibration import nominal_level
 from wayfuse.evaluation.errors import MethodScores, PointErrors, Scores
+from wayfuse.evaluation.plot_look import FAINT, INK, new_figure, shown, style
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -30,35 +27,12 @@ __all__ = [
     "cdf_figure",
     "choose_walks",
     "error_by_time_figure",
-    "new_figure",
-    "shown",
-    "style",
     "write_plots",
 ]
 
-# Okabe, Ito, Color Universal Design, 2008; yellow is left out: too light for a line on white.
-COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#7F7F7F")
-DASHES: tuple[Any, ...] = ("-", (0, (5, 1.6)), (0, (1.4, 1.2)), (0, (6, 1.4, 1.4, 1.4)))
-INK, FAINT = "#333333", "#d9d9d9"
 LEVELS = (50, 75, 95)  # % marked in the distribution
 _FAR = 1e6  # m, beyond any plot: a distribution goes on at 100 %
 _MIN_POINTS = 10  # per span of time; fewer make no figure
-
-
-def style(index: int) -> dict[str, Any]:
-    """Colour and dash of the method with an index; the first seven differ in colour."""
-    dash = DASHES[(index % len(COLOURS) + index // len(COLOURS)) % len(DASHES)]
-    return {"color": COLOURS[index % len(COLOURS)], "linestyle": dash, "linewidth": 1.9}
-
-
-def new_figure(width: float, height: float) -> Figure:
-    """Empty figure (inches) on the Agg canvas, laid out so that nothing overlaps."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(width, height), facecolor="white", layout="constrained")
-    FigureCanvasAgg(figure)
-    return figure
 
 
 def _axes(ax: Axes, x: str, y: str, title: str) -> None:
@@ -75,11 +49,6 @@ def _axes(ax: Axes, x: str, y: str, title: str) -> None:
 
 def _used(scores: Scores, missing: str) -> list[tuple[MethodScores, PointErrors]]:
     return [(m, m.points["1hz"].used(missing)) for m in scores.methods]
-
-
-def shown(name: str) -> str:
-    """Name of a method as the start of a label: one that begins with _ would be kept out of the legend."""
-    return f" {name}" if name.startswith("_") else name
 
 
 def _legend(ax: Axes) -> None:
