@@ -105,7 +105,7 @@ best (0.8 and 1.2 are better, for a wrong compass wants a wider cloud), k = 32 a
 bar. A trap of the faster walk: at 1.00 m/s a lap is 27 scans exactly, Eq. 5 then overshoots the same corners by the same
 piece every lap, and this cancels nearly half of the drift (dead reckoning 15 m, fused 1.8 m); the run of Figure 7 is at
 1.01 m/s, where no lap is like the one before.
-"""
+"""  # noqa: E501 - tables of Markdown
 
 
 @dataclass(frozen=True, slots=True)
