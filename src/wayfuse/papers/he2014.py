@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -15,7 +16,7 @@ from wayfuse.evaluation.results_folds import Mapper
 from wayfuse.models.motion.adaptive import Walked
 from wayfuse.papers.reproduction import Interval, Reproduction, Table, mean_interval
 from wayfuse.presets import he2014
-from wayfuse.radio.gp_field import fit_gp_field
+from wayfuse.radio.gp_field import GpField, fit_gp_field
 from wayfuse.simulator.he2014_world import Room, sense, strength, survey_places, true_walk
 
 __all__ = ["PAGE", "SEEDS", "reproduce"]
@@ -52,17 +53,19 @@ commercial ray tracer and prints none of them: the room here is ray-traced by im
 
 ## From equation to test
 
+Functions below `wayfuse`; tests in the folder of tests/ that is named as the room.
+
 | paper | function | test |
 |---|---|---|
-| Sec. I, II: Gaussian process of the signals (Ferris et al.) | `radio.gp_field.fit_gp_field` | tests/radio/test_gp_field.py |
-| Sec. II: start from the k nearest fingerprints | `presets.he2014.nearest_start` | tests/papers/test_he2014.py |
-| Sec. II-A (1), Eq. 1: standing or walking, psi | `inertial.stage_transition.find_stages` | tests/inertial/test_stage_transition.py |
-| Sec. II-A (2): steps by the most frequent lag | `inertial.stage_transition.walks` | tests/inertial/test_stage_transition.py |
-| Eq. 2: stride | `inertial.stage_transition.stride` | tests/inertial/test_stage_transition.py |
-| Sec. II-A (3): compass at the start, then the gyro's yaw | `presets.he2014.headings` | tests/papers/test_he2014.py |
-| Eq. 3, Sec. II-B: resampling at every epoch, mean of the particles | `presets.he2014.track` | tests/papers/test_he2014.py |
-| Eq. 4, Eq. 5, disc of 1 m | `models.motion.adaptive.AdaptiveMotion` | tests/models/test_adaptive_motion.py |
-| Sec. III, Figure 8: the room | `simulator.he2014_world` | tests/simulator/test_sim_images.py |
+| Sec. II: Gaussian process of the signals | `radio.gp_field.fit_gp_field` | test_gp_field.py |
+| Sec. II: start from the k nearest fingerprints | `presets.he2014.nearest_start` | test_he2014.py |
+| Sec. II-A (1), Eq. 1: standing or walking, psi | `inertial.stage_transition.find_stages` | test_stage_transition.py |
+| Sec. II-A (2): steps by the most frequent lag | `inertial.stage_transition.walks` | test_stage_transition.py |
+| Eq. 2: stride | `inertial.stage_transition.stride` | test_stage_transition.py |
+| Sec. II-A (3): compass at the start, then the gyro's yaw | `presets.he2014.headings` | test_he2014.py |
+| Eq. 3, Sec. II-B: resampling at every epoch, mean of the particles | `presets.he2014.track` | test_he2014.py |
+| Eq. 4, Eq. 5, disc of 1 m | `models.motion.adaptive.AdaptiveMotion` | test_adaptive_motion.py |
+| Sec. III, Figure 8: the room | `simulator.he2014_world` | test_sim_images.py |
 
 ## What the paper leaves open, and what was taken
 
@@ -101,8 +104,8 @@ commercial ray tracer and prints none of them: the room here is ray-traced by im
   before Eq. 4 cites [4] for what is plain dead reckoning.
 - The rate is not printed. At 100 Hz the lags of 30 to 60 samples are 0.3 to 0.6 s, one step; at 50 Hz two steps.
   Measured on the validation walks of oxford-steps (12 walks): at 100 Hz the count errs by less than 1 % with the phone
-  in the hand, as the paper holds it, but misses two steps of three in trouser pockets, where only pairs of steps repeat;
-  at 50 Hz with two steps per period the mean error over all carrying positions is 4 %.
+  in the hand, as the paper holds it, but misses two steps of three in trouser pockets, where only pairs of steps
+  repeat; at 50 Hz with two steps per period the mean error over all carrying positions is 4 %.
 - As printed, psi needs two windows ahead, so each walk loses the samples of its last two windows.
 
 ## Why figures differ
@@ -112,8 +115,8 @@ single runs scatter by several metres (one access point: 6 m or 18 m, by which o
 Rows marked (F) were used to fit the noise; those marked (T) follow from it and are a test. A lost run is one that ends
 more than 10 m away; none is left out of any figure.
 
-The bars on the k-NN start ask whether the motion model is *shown* to be better: the lower 90 % limit of its gain is to be
-above 0 with 3 and 4 access points, and not with 1 and 2.
+The bars on the k-NN start ask whether the motion model is *shown* to be better: the lower 90 % limit of its gain is to
+be above 0 with 3 and 4 access points, and not with 1 and 2.
 """
 _Row = tuple[str | float | Interval, ...]
 
@@ -132,6 +135,17 @@ def _sets(n: int) -> Iterator[tuple[int, ...]]:
         yield tuple((first + i) % 4 for i in range(n))
 
 
+def _fit(room: Room, survey: Array) -> GpField:
+    return fit_gp_field(survey_places(room), survey, (0.0, 0.0, *room.size[:2]))
+
+
+@lru_cache(maxsize=2)  # all seeds of a room share them
+def _clean(room: Room) -> tuple[Array, Array, GpField]:
+    # strengths at the survey places (n, a) and on the walk (T + 1, a), and the field of a survey without noise
+    survey = strength(room, survey_places(room))
+    return survey, strength(room, true_walk(room).xy), _fit(room, survey)
+
+
 @dataclass(frozen=True, slots=True)
 class _Worker:
     """Runs one seed in a room, for 1 to 4 access points; travels to the worker processes."""
@@ -143,8 +157,10 @@ class _Worker:
         room, walk, places = self.room, true_walk(self.room), survey_places(self.room)
         config = he2014.Config()
         rng = np.random.default_rng([seed, 2014])
-        sensed = sense(room, strength(room, places), strength(room, walk.xy), walk, rng)
-        field = fit_gp_field(places, sensed.survey, (0.0, 0.0, *room.size[:2]))
+        survey, on_walk, field = _clean(room)
+        sensed = sense(room, survey, on_walk, walk, rng)
+        if room.survey_noise_db > 0.0:
+            field = _fit(room, sensed.survey)
         heading = he2014.headings(sensed.compass, sensed.yaw)
         moves = [Walked(*move) for move in zip(sensed.length.tolist(), heading.tolist(), strict=True)]
         error = np.zeros((len(self.ways), 4, len(walk.xy)))
