@@ -78,7 +78,8 @@ count and orientation. No survey is needed.
 - **Wi-Fi alone** needs a motion model, which is not given: a random walk of 1.75 m per axis and scan. Its figure is the
   lag of that walk more than radio noise (0.8 m gives 6.9, 3.2 m gives 3.7).
 - **Cosine**: of RSS + 100, unheard as 0; the offset is not given.
-- **Step count.** The world below gives counts, so that the figures do not depend on a simulated gait.
+- **Step count.** The world below gives counts, so that the figures do not depend on a simulated gait. The counter of
+  Section III-C stands apart: on the 12 counted validation walks of oxford-steps its mean error is 0.9 %.
 - **Start**: the true pose, for all rows; the estimate is the weighted mean before resampling, resampling systematic and
   after every scan.
 
@@ -94,8 +95,14 @@ sides: 0.296 rad one way on one short side and the other way on the other, which
 
 **Fitted (F):** the rows "Wi-Fi alone" (the random walk) and "IMU alone" (the distortion). **Test (T?):** "fused" and
 "fingerprints" follow, but weakly: the sides that are distorted, the grid (four were tried: fused 2.4 to 2.7) and the
-surveyed places (three layouts: 2.5 each) were chosen with these rows in view. One real data set stands behind the
-paper's figures, ours is its caricature: orders and trends say more than decimals.
+surveyed places (three layouts: 2.5 each) were chosen with these rows in view, on seeds 0 to 15. Twenty fresh seeds then
+gave 5.32, 27.5, 2.67 and 2.46 m. One real data set stands behind the paper's figures, ours is its caricature: orders and
+trends say more than decimals.
+
+Dead reckoning alone is lost in every run, by design; so is the filter with sigma_d = 0.1, which trusts a wrong compass.
+A run counts as lost when its last minute is more than 10 m off on average. Lost runs are in all means.
+
+Everything on this page is simulated; no recording is used.
 
 ## What does not follow
 
@@ -105,7 +112,7 @@ best (0.8 and 1.2 are better, for a wrong compass wants a wider cloud), k = 32 a
 bar. A trap of the faster walk: at 1.00 m/s a lap is 27 scans exactly, Eq. 5 then overshoots the same corners by the same
 piece every lap, and this cancels nearly half of the drift (dead reckoning 15 m, fused 1.8 m); the run of Figure 7 is at
 1.01 m/s, where no lap is like the one before.
-"""  # noqa: E501 - tables of Markdown
+"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -209,7 +216,7 @@ def reproduce(seeds: Sequence[int], mapper: Mapper) -> Reproduction:
     errors = {name: np.array([run[name][0] for run in runs]) for name in runs[0]}
     lost = {name: sum(run[name][1] for run in runs) for name in runs[0]}
     tables = (_main_table(errors), *_sweep_tables(errors))
-    lines = tuple(f"{name}: {n} of {len(runs)} runs" for name, n in lost.items() if n and name != "imu")
+    lines = tuple(f"{name}: {n} of {len(runs)} runs" for name, n in lost.items() if n)
     return Reproduction("liu2017", tuple(seeds), tables, _bars(errors), lines)
 
 

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from wayfuse.core.philox import Noise, track_key
 from wayfuse.core.types import Array
@@ -46,7 +47,7 @@ class GridMap:
     def __post_init__(self) -> None:
         object.__setattr__(self, "_flat", self.levels.reshape(-1, self.levels.shape[-1]))
 
-    def at(self, x: Array, y: Array) -> Array:
+    def at(self, x: NDArray[np.floating], y: NDArray[np.floating]) -> Array:
         """Levels (n, a) dBm by bilinear interpolation of the training places."""
         ny, nx, _ = self.levels.shape
         gx = np.clip(np.asarray(x, dtype=np.float64) / self.grain, 0.0, nx - 1.0)

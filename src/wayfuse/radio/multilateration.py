@@ -6,8 +6,9 @@ The weighted centroid of the anchors needs no start and is near enough to start 
 .. math:: x_j x + y_j y - R / 2 = (x_j^2 + y_j^2 - d_j^2) / 2
 
 Weighted least squares takes R for a third unknown; constrained weighted least squares [2]_ keeps R = x² + y², by
-Gauss-Newton from the weighted centroid, the WC-CWLS of [1]_. The error of d² is 2 d times that of d, so weights are
-1/d² where errors are equal and 1/d⁴ where they grow with range, as those of powers do.
+Levenberg-Marquardt from the weighted centroid, the WC-CWLS of [1]_: the nearest minimum, which with few anchors and
+bad ranges is not always the least. The error of d² is 2 d times that of d, so weights are 1/d² where errors are equal
+and 1/d⁴ where they grow with range, as those of powers do.
 
 All functions take the ranges of k moments at once, (k, n) m, NaN where an anchor was not heard.
 
@@ -28,10 +29,10 @@ from wayfuse.core.types import Array
 
 __all__ = ["constrained_least_squares", "weighted_centroid", "weighted_least_squares"]
 
-_NEAREST = 0.1  # m, the least range a weight is made of
-_N_ITERATIONS = 20
-_LONGEST_STEP = 5.0  # m, of one iteration
-_FLAT = 1e-9  # relative determinant below which the anchors do not tell a place
+_NEAREST = 1.0  # m, the least range a weight is made of: the error of a range does not vanish with it
+_N_ITERATIONS = 30
+_DAMPING = 0.1  # Levenberg-Marquardt, relative, at first
+_FLAT = 1e-9  # relative singular value or determinant below which the anchors do not tell a place
 
 
 def _weights(anchors: Array, ranges: Array, power: float) -> tuple[Array, Array]:
@@ -58,16 +59,14 @@ def weighted_centroid(anchors: Array, ranges: Array, power: float = 1.0) -> Arra
 def weighted_least_squares(anchors: Array, ranges: Array, power: float = 4.0) -> Array:
     """Linear least squares with R free, weights 1/d^power: (k, 2) m; NaN with fewer than 3 anchors, or in a row."""
     d, w = _weights(anchors, ranges, power)
-    origin = anchors.mean(axis=0)
-    a = np.column_stack([anchors - origin, np.full(len(anchors), -0.5)])
-    b = 0.5 * (((anchors - origin) ** 2).sum(axis=1) - d**2)
-    normal = np.einsum("kn,ni,nj->kij", w, a, a)
-    right = np.einsum("kn,ni,kn->ki", w, a, b)
-    scale = np.prod(np.maximum(np.einsum("kii->ki", normal), 1e-300), axis=1)
-    solvable = np.linalg.det(normal) > _FLAT * scale
-    out = np.full((len(ranges), 2), np.nan)
-    out[solvable] = np.linalg.solve(normal[solvable], right[solvable][..., None])[:, :2, 0] + origin
-    return out
+    spread = max(float(np.abs(anchors - anchors.mean(axis=0)).max()), 1e-9)  # unknowns of one size
+    placed = (anchors - anchors.mean(axis=0)) / spread
+    root = np.sqrt(w)
+    a = root[..., None] * np.column_stack([placed, np.ones(len(anchors))])
+    b = root * 0.5 * ((placed**2).sum(axis=1) - (d / spread) ** 2)
+    solved = (np.linalg.pinv(a, rcond=_FLAT) @ b[..., None])[:, :2, 0]
+    is_sound = np.linalg.matrix_rank(a, rtol=_FLAT) == 3
+    return np.asarray(np.where(is_sound[:, None], anchors.mean(axis=0) + spread * solved, np.nan))
 
 
 def constrained_least_squares(
@@ -82,24 +81,32 @@ def constrained_least_squares(
     d, w = _weights(anchors, ranges, power)
     xy = weighted_centroid(anchors, ranges) if start is None else start.astype(np.float64)
     xy = np.where((np.isfinite(ranges).sum(axis=1) >= 3)[:, None], xy, np.nan)
-    best, least = xy.copy(), np.full(len(xy), np.inf)
-    for _ in range(_N_ITERATIONS + 1):
-        apart = xy[:, None] - anchors  # (k, n, 2)
-        residual = d**2 - (apart**2).sum(axis=-1)
-        cost = (w * residual**2).sum(axis=1)
-        better = cost < least
-        best[better], least[better] = xy[better], cost[better]
-        xy = xy + _step(w, 2.0 * apart, residual)
-    return best
+    damping = np.full(len(xy), _DAMPING)
+    cost = _cost(anchors, d, w, xy)
+    for _ in range(_N_ITERATIONS):
+        tried = xy + _step(anchors, d, w, xy, damping)
+        cost_there = _cost(anchors, d, w, tried)
+        better = cost_there < cost
+        xy = np.where(better[:, None], tried, xy)
+        cost = np.where(better, cost_there, cost)
+        damping = np.where(better, damping / 3.0, damping * 5.0)
+    return np.asarray(xy)
 
 
-def _step(w: Array, jacobian: Array, residual: Array) -> Array:
-    """Gauss-Newton steps (k, 2) m, none longer than 5 m; none where the anchors tell nothing."""
-    gx, gy = jacobian[..., 0], jacobian[..., 1]
+def _cost(anchors: Array, d: Array, w: Array, xy: Array) -> Array:
+    """Weighted sum of squares (k,) at places (k, 2) m."""
+    residual = d**2 - ((xy[:, None] - anchors) ** 2).sum(axis=-1)
+    return np.asarray((w * residual**2).sum(axis=1))
+
+
+def _step(anchors: Array, d: Array, w: Array, xy: Array, damping: Array) -> Array:
+    """Damped Gauss-Newton steps (k, 2) m; none where the anchors tell nothing."""
+    apart = xy[:, None] - anchors  # (k, n, 2)
+    residual = d**2 - (apart**2).sum(axis=-1)
+    gx, gy = 2.0 * apart[..., 0], 2.0 * apart[..., 1]
     a, b, c = ((w * p * q).sum(axis=1) for p, q in ((gx, gx), (gx, gy), (gy, gy)))
     e, f = (w * gx * residual).sum(axis=1), (w * gy * residual).sum(axis=1)
+    a, c = (1.0 + damping) * a, (1.0 + damping) * c
     determinant = a * c - b * b
     safe = np.where(determinant > _FLAT * a * c, determinant, np.inf)
-    step = np.column_stack([(c * e - b * f) / safe, (a * f - b * e) / safe])
-    length = np.hypot(*step.T)
-    return np.asarray(step * np.minimum(1.0, _LONGEST_STEP / np.maximum(length, 1e-12))[:, None])
+    return np.column_stack([(c * e - b * f) / safe, (a * f - b * e) / safe])
