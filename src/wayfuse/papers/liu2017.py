@@ -102,13 +102,14 @@ trends say more than decimals.
 Dead reckoning alone is lost in every run, by design; so is the filter with sigma_d = 0.1, which trusts a wrong compass.
 A run counts as lost when its last minute is more than 10 m off on average. Lost runs are in all means.
 
-Everything on this page is simulated; no recording is used.
+All figures of the tables below are simulated.
 
 ## What does not follow
 
-Under neither reading of Eq. 3: lambda = 0.01 as the best (multiplying, a kernel of 3 m is better), sigma_d = 0.4 as the
-best (0.8 and 1.2 are better, for a wrong compass wants a wider cloud), k = 32 as the best on cells of 1 m and k = 4 on
-2 m (all are alike under so wide a kernel). A faster walk is as good as a slow one here, not worse. None of these has a
+lambda = 0.01 as the best: multiplying, a kernel of 3 m is better, and lambda = 1, which means the same under both
+readings, is better than 0.01 under both. sigma_d = 0.4 as the best: 0.8 and 1.2 are better, for a wrong compass wants a
+wider cloud. k = 32 as the best on cells of 1 m and k = 4 on 2 m: they hardly differ under so wide a kernel. A faster walk
+as worse: it is as good as a slow one here. None of these has a
 bar. A trap of the faster walk: at 1.00 m/s a lap is 27 scans exactly, Eq. 5 then overshoots the same corners by the same
 piece every lap, and this cancels nearly half of the drift (dead reckoning 15 m, fused 1.8 m); the run of Figure 7 is at
 1.01 m/s, where no lap is like the one before.
