@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,8 +15,10 @@ from wayfuse.evaluation.results_folds import in_turn
 from wayfuse.filters.cloud import Cloud
 from wayfuse.models.motion.step_count import CountedSteps, StepCountMotion
 from wayfuse.papers import karlsson2015 as page
+from wayfuse.papers.karlsson2015_real import band_errors, fix_errors, read_buildings, real_tables
 from wayfuse.papers.karlsson2015_runs import fitted_bands, long_walk, short_walk
 from wayfuse.presets import karlsson2015 as preset
+from wayfuse.radio.band_correlation import correlate
 from wayfuse.simulator import karlsson2015_world as world
 
 QUIET = replace(
@@ -112,8 +115,8 @@ def test_a_scan_that_hears_nothing_is_survived() -> None:
     np.testing.assert_allclose(preset.least_squares(config, plan, silent), np.tile([20.0, 12.5], (4, 1)))
 
 
-def test_three_seeds_come_near_the_paper() -> None:
-    result = page.reproduce(range(3), in_turn)
+def test_two_seeds_come_near_the_paper() -> None:
+    result = page.reproduce(range(2), in_turn)
     values = {bar.what: bar.value for bar in result.bars}
     assert values["Table I: printed against Fisher interval ends, largest difference"] <= 0.01
     assert 1.3 < values["Table II, both bands"] < 2.3
@@ -123,3 +126,24 @@ def test_three_seeds_come_near_the_paper() -> None:
     assert not result.lost
     widths = [(len(table.columns), {len(row) for row in table.rows}) for table in result.tables]
     assert all({n} == found for n, found in widths)
+
+
+def test_absent_data_are_said_to_be_absent(tmp_path: Path) -> None:
+    (table,) = real_tables(tmp_path)
+    assert table.columns == ("not measured",)
+
+
+@pytest.mark.real_data
+def test_real_bands_share_their_walls_but_not_their_fading(data_root: Path) -> None:
+    buildings = {b.name: b for b in read_buildings(data_root / "sodindoorloc")}
+    if not buildings:
+        pytest.skip("REAL DATA ABSENT: no sodindoorloc; fetch with `wayfuse datasets fetch sodindoorloc`")
+    errors = band_errors(buildings["SYL"])
+    assert len(errors) > 15
+    assert np.mean([correlate(*e.across).r for e in errors]) > 0.45
+    assert abs(np.mean([correlate(*e.within).r for e in errors])) < 0.2
+    found = fix_errors(buildings["SYL"], (0, 1))
+    assert len(found) > 90
+    assert (
+        4.0 < found.mean() < 9.0
+    )  # of a building of about 60 m: a wrong column or frame gives 20 m and more

@@ -11,7 +11,13 @@ from hypothesis import strategies as st
 
 from wayfuse.core.errors import ConfigError
 from wayfuse.core.types import Array
-from wayfuse.radio.band_correlation import correlate, effective_pairs, fisher_interval, model_errors
+from wayfuse.radio.band_correlation import (
+    correlate,
+    effective_pairs,
+    fisher_interval,
+    model_errors,
+    split_errors,
+)
 from wayfuse.radio.path_loss import PathLoss
 
 
@@ -103,3 +109,22 @@ def test_too_few_pairs_or_errors_that_do_not_vary_are_refused() -> None:
         correlate([1.0, 2.0, 3.0, math.nan], [1.0, 2.0, 4.0, 1.0])
     with pytest.raises(ConfigError, match="do not vary"):
         correlate([1.0, 1.0, 1.0, 1.0], [1.0, 2.0, 4.0, 1.0])
+
+
+def test_what_belongs_to_a_place_and_what_changes_there_are_told_apart() -> None:
+    rng = np.random.default_rng(10)
+    places, samples = 400, 20
+    distance = np.repeat(rng.uniform(2.0, 30.0, places), samples)
+    place = np.repeat(np.arange(places), samples)
+    walls = np.repeat(6.0 * rng.standard_normal(places), samples)
+    first, second = (
+        PathLoss(-38.0, alpha, 3.0).at(distance) + walls + 2.0 * rng.standard_normal(len(place))
+        for alpha in (0.1, 0.2)
+    )
+    first[:5] = np.nan
+    across, within = split_errors(distance, first, second, place)
+    assert across.shape == (2, places)
+    assert within.shape == (2, places * samples - 5)
+    assert correlate(*across).r > 0.97
+    assert abs(correlate(*within).r) < 5.0 / math.sqrt(places * samples)
+    assert within.std(axis=1) == pytest.approx(2.0 * math.sqrt(1.0 - 1.0 / samples), rel=0.03)

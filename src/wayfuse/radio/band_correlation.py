@@ -18,15 +18,24 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from wayfuse.core.errors import ConfigError
-from wayfuse.core.types import Array
+from wayfuse.core.types import Array, IntArray
 from wayfuse.radio.path_loss import fit_path_loss
 
-__all__ = ["Correlation", "correlate", "effective_pairs", "fisher_interval", "model_errors"]
+__all__ = [
+    "Correlation",
+    "SplitErrors",
+    "correlate",
+    "effective_pairs",
+    "fisher_interval",
+    "model_errors",
+    "split_errors",
+]
 
 _TWO_SIDED_95 = 1.959963984540054  # quantile 0.975 of the normal distribution
 _N_LEAST = 4  # n - 3 is to be positive
@@ -78,6 +87,33 @@ def correlate(a: ArrayLike, b: ArrayLike, *, n_effective: float | None = None) -
     r = float(np.clip(float(x @ y) / math.sqrt(power), -1.0, 1.0))
     low, high = fisher_interval(r, n if n_effective is None else max(float(_N_LEAST), n_effective))
     return Correlation(r, low, high, n)
+
+
+class SplitErrors(NamedTuple):
+    """Errors of two bands (2, k): of the means of each place, and of each reading about the mean of its place."""
+
+    across: Array
+    within: Array
+
+
+def split_errors(distance: Array, first: Array, second: Array, place: IntArray) -> SplitErrors:
+    """Model errors split into what belongs to a place and what changes while one stays there.
+
+    A walk sees both at once; walls and furniture make the first, people and fading the second. Only if both are
+    uncorrelated between bands does a second band bring a second, independent place.
+
+    Parameters
+    ----------
+    distance : (n,) m to the access point. first, second : (n,) dBm of the two bands, NaN where not heard (the pair
+    is left out). place : (n,) which place.
+    """
+    both = np.isfinite(first) & np.isfinite(second)
+    _, which, count = np.unique(place[both], return_inverse=True, return_counts=True)
+    away = np.bincount(which, distance[both]) / count
+    means = [np.bincount(which, band[both]) / count for band in (first, second)]
+    across = np.array([model_errors(away, mean) for mean in means])
+    within = np.array([band[both] - mean[which] for band, mean in zip((first, second), means, strict=True)])
+    return SplitErrors(across, within)
 
 
 def effective_pairs(a: Array, b: Array) -> float:
