@@ -37,10 +37,13 @@ class Config:
     radius: float = 1.0  # m, disc of a standing user, Sec. II-B
     length_sigma: float = 0.1  # m per epoch, Eq. 4; not printed
     heading_sigma: float = 0.1  # rad, Eq. 5; not printed
+    least_noise: float = 1.0  # dB, of the Gaussian process; not printed, docs/papers/he2014.md
 
     def __post_init__(self) -> None:
-        if self.n_particles < 1 or self.k < 1:
-            raise ConfigError("n_particles and k must be 1 or more", where="he2014.Config")
+        if self.n_particles < 1 or self.k < 1 or not self.least_noise > 0.0:
+            raise ConfigError(
+                "n_particles and k must be 1 or more, least_noise above 0 dB", where="he2014.Config"
+            )
 
 
 def nearest_start(config: Config, places: Array, fingerprints: Array, z: Array) -> Array:

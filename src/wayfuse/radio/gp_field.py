@@ -39,8 +39,8 @@ class SquaredExponential(NamedTuple):
     noise: float = 1.0
 
 
-# a reading is a whole number of dBm at best, and the field a model: less than 1 dB of noise is never believed
-_BOUNDS = ((0.5, 100.0), (0.5, 200.0), (1.0, 20.0))
+_BOUNDS = ((0.5, 100.0), (0.5, 200.0))  # of signal (dB) and length (m)
+_MOST_NOISE = 20.0  # dB
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -103,8 +103,11 @@ def log_evidence(squared: Array, residual: Array, kernel: SquaredExponential) ->
     return value, np.array(slopes)
 
 
-def fit_squared_exponential(xy: Array, residual: Array) -> SquaredExponential:
-    """Parameters of the highest marginal likelihood for residuals (n,) dB at places (n, 2) m."""
+def fit_squared_exponential(xy: Array, residual: Array, least_noise: float = 1.0) -> SquaredExponential:
+    """Parameters of the highest marginal likelihood for residuals (n,) dB at places (n, 2) m.
+
+    least_noise : dB; a reading is a whole number of dBm at best, and the field a model.
+    """
     from scipy.optimize import minimize
 
     squared = _squared(xy, xy)
@@ -113,15 +116,23 @@ def fit_squared_exponential(xy: Array, residual: Array) -> SquaredExponential:
         value, gradient = log_evidence(squared, residual, SquaredExponential(*np.exp(log_parameters)))
         return -value, -gradient
 
-    bounds = [(float(np.log(low)), float(np.log(high))) for low, high in _BOUNDS]
+    bounds = [
+        (float(np.log(low)), float(np.log(high))) for low, high in (*_BOUNDS, (least_noise, _MOST_NOISE))
+    ]
     found = minimize(cost, np.log(SquaredExponential()), jac=True, method="L-BFGS-B", bounds=bounds)
     return SquaredExponential(*np.exp(found.x).tolist())
 
 
 def fit_gp_field(
-    xy: Array, rssi: Array, extent: tuple[float, float, float, float], step: float = 0.5
+    xy: Array,
+    rssi: Array,
+    extent: tuple[float, float, float, float],
+    step: float = 0.5,
+    least_noise: float = 1.0,
 ) -> GpField:
     """Fit the fields to readings rssi (n, a) dBm at places (n, 2) m, on a grid over extent (x0, y0, x1, y1) m.
+
+    least_noise : dB, as in `fit_squared_exponential`.
 
     Raises
     ------
@@ -135,17 +146,17 @@ def fit_gp_field(
         )
     x, y = (np.arange(low, high + step, step) for low, high in (extent[::2], extent[1::2]))
     nodes = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
-    tables = [_field(xy, column, nodes) for column in rssi.T]
+    tables = [_field(xy, column, nodes, least_noise) for column in rssi.T]
     mean, sigma = (np.stack(t, axis=-1).reshape(len(y), len(x), -1) for t in zip(*tables, strict=True))
     return GpField(np.array(extent[:2]), step, mean, sigma)
 
 
-def _field(xy: Array, rssi: Array, nodes: Array) -> tuple[Array, Array]:
+def _field(xy: Array, rssi: Array, nodes: Array, least_noise: float) -> tuple[Array, Array]:
     # mean and sd (k,) of a reading of one access point at nodes (k, 2): Eq. 2.25, 2.26 of [2]
     from scipy.linalg import cho_solve, cholesky, solve_triangular
 
     level = float(rssi.mean())
-    kernel = fit_squared_exponential(xy, rssi - level)
+    kernel = fit_squared_exponential(xy, rssi - level, least_noise)
     covariance = kernel.signal**2 * np.exp(-0.5 * _squared(xy, xy) / kernel.length**2)
     covariance[np.diag_indices(len(xy))] += kernel.noise**2
     lower = cholesky(covariance, lower=True)
