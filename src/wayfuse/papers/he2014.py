@@ -220,7 +220,7 @@ def _figure_12(error: Array) -> Table:
         "Figure 12: error (m) at an epoch, one access point",
         ("", *(f"epoch {epoch}" for epoch in _EPOCHS)),
         tuple(rows),
-        "The paper shows a curve without a scale one could read; its gain is that of the true start only (T).",
+        "The paper's text gives no figures for its curves. That the motion model helps follows for the true start (T).",
     )
 
 
