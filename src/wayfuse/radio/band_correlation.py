@@ -6,7 +6,7 @@ in quick succession are not independent: pass ``n_effective`` (see `effective_pa
 
 >>> study = correlate([1.0, 2.0, 3.0, 4.0, 5.0], [1.1, 1.9, 3.2, 3.8, 5.1])
 >>> round(study.r, 3), study.n
-(0.996, 5)
+(0.995, 5)
 
 References
 ----------
