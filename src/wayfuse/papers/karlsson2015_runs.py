@@ -29,7 +29,7 @@ CORRELATIONS = (
     0.75,
     0.999999,
 )  # of the errors of the bands; at 1 there is no Cholesky factor
-WALKS = (0.8, 0.86, 0.95, 1.1)  # m per root second
+WALKS = (0.8, 0.84, 0.95, 1.1)  # m per root second
 SURVEY = 100  # places
 MEMORIES = (0.0, 0.5, 0.9)
 

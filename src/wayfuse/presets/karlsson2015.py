@@ -32,12 +32,11 @@ class Config:
     """Numbers of the paper, and those it leaves open, which were fitted to rows of its tables (F in docs/papers)."""
 
     bands: tuple[PathLoss, ...] = (
-        PathLoss(
-            power=-35.0, attenuation=0.15, sigma=3.6
-        ),  # 2.4 GHz; Eq. 1; sigma F: Table II, 2.4 GHz alone
-        PathLoss(power=-40.0, attenuation=0.25, sigma=4.8),  # 5 GHz; Eq. 1; sigma F: Table II, 5 GHz alone
+        # 2.4 GHz, 5 GHz; Eq. 1. sigma F: Table II, each band alone; power and alpha not printed
+        PathLoss(power=-35.0, attenuation=0.15, sigma=3.5),
+        PathLoss(power=-40.0, attenuation=0.25, sigma=4.5),
     )
-    walk_sigma: float = 0.86  # m per root second and axis, section IV; F: Table III, PF Wi-Fi only
+    walk_sigma: float = 0.84  # m per root second and axis, section IV; F: Table III, PF Wi-Fi only
     step_length: float = 0.83  # m, l of Eq. 2; caption of Figure 2
     length_sigma: float = 0.1  # m, sigma_r of Eq. 2; not printed
     heading_sigma: float = 0.1  # rad, sigma_v of Eq. 2, per step; not printed

@@ -57,7 +57,7 @@ class RadioWorld:
     correlation : of the errors of the two bands of one access point.
     """
 
-    bands: tuple[BandWorld, ...] = (BandWorld(-35.0, 0.15, 3.6, -90.0), BandWorld(-40.0, 0.25, 4.8, -85.0))
+    bands: tuple[BandWorld, ...] = (BandWorld(-35.0, 0.15, 3.5, -90.0), BandWorld(-40.0, 0.25, 4.5, -85.0))
     shared: float = 0.5
     length: float = 3.0
     correlation: float = 0.0
