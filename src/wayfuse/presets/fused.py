@@ -75,11 +75,11 @@ class Config:
     kernel_limits: tuple[float, float] = (1.2, 6.0)
     kernel_unknown: float = 4.0  # m, of a survey that does not know its accuracy
     background: float = 0.03
-    exponent: float = 0.4  # tempering: errors of successive scans are much alike
+    exponent: float = 0.42  # tempering: errors of successive scans are much alike
     coverage_gain: float = 1.5  # nats
     length_sigma: float = 0.15  # relative, per step
     heading_sigma: float = 0.06  # rad, per step
-    bias_sigma: float = 0.025  # rad, per step
+    bias_sigma: float = 0.03  # rad, per step
     scale_sigma: float = 0.006  # per step
     first_bias_sigma: float = 0.3  # rad; rotation vector against truth: 0.17 between walks
     first_scale_sigma: float = 0.08  # per-walk mean step against the model
