@@ -75,7 +75,7 @@ class Config:
     kernel_limits: tuple[float, float] = (1.2, 6.0)
     kernel_unknown: float = 4.0  # m, of a survey that does not know its accuracy
     background: float = 0.03
-    exponent: float = 0.42  # tempering: errors of successive scans are much alike
+    exponent: float = 0.41  # tempering: errors of successive scans are much alike
     coverage_gain: float = 1.5  # nats
     length_sigma: float = 0.15  # relative, per step
     heading_sigma: float = 0.06  # rad, per step

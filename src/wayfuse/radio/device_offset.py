@@ -69,7 +69,7 @@ class DeviceOffset:
     same_phone: float = 2.0
     temperature: float = 0.03
     k: int = 5
-    burn_in: int = 12
+    burn_in: int = 8
     strongest: int = 40
     every: int = 4
     memory: float = 60.0
