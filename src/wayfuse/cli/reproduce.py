@@ -28,8 +28,7 @@ def reproduce(
 ) -> None:
     """Run the experiments of a published system and print the paper's figures against ours.
 
-    PRESET is chu2009, he2014, karlsson2015, li2015, liu2017, or `all` of those that are there. The exit status is 1 when a bar
-    does not hold.
+    PRESET is chu2009, he2014, karlsson2015, li2015, liu2017, or `all`. The exit status is 1 when a bar does not hold.
     """
     import json
 
