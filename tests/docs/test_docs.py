@@ -332,5 +332,5 @@ def test_the_python_example_of_the_readme_runs(
     monkeypatch.chdir(tmp_path)
     exec(compile(example, "README.md", "exec"), {"__name__": "readme"})  # noqa: S102
     assert re.search(
-        r"^-?\d+\.\d m, -?\d+\.\d m, F?\d, within \d+\.\d m$", capsys.readouterr().out, re.MULTILINE
+        r"^-?\d+\.\d m, -?\d+\.\d m, \d, within \d+\.\d m$", capsys.readouterr().out, re.MULTILINE
     )

@@ -120,7 +120,7 @@ def test_the_prior_is_somewhere_on_the_largest_floor(world: Any) -> None:
         ("n_particles", 3), ("k", 0), ("temperature", 0.0), ("kernel_width", -1.0), ("background", 0.0),
         ("exponent", 0.0),
         ("length_sigma", -0.1), ("heading_sigma", -0.1), ("bias_sigma", np.nan), ("first_bias_sigma", -1.0),
-        ("injection", 1.5), ("penalty", -1.0), ("diffusion", 0.0), ("resampling", "none"),
+        ("injection", 1.0), ("penalty", -1.0), ("diffusion", 0.0), ("resampling", "none"),
     ],
 )  # fmt: skip
 def test_parameters_out_of_range_are_refused(world: Any, name: str, value: Any) -> None:

@@ -151,7 +151,14 @@ def test_a_cloud_that_spreads_is_lost_once_it_was_settled(world: Any) -> None:
 
 
 def test_parameters_out_of_range_are_refused() -> None:
-    for bad in ({"injection": 1.1}, {"injection": -0.1}, {"reset_share": 1.5}, {"patience": 0}):
+    for bad in (
+        {"injection": 1.0},
+        {"injection": -0.1},
+        {"injection_least": -0.1},
+        {"hold": 1.5},
+        {"reset_share": 1.5},
+        {"patience": 0},
+    ):
         with pytest.raises(ConfigError, match="shares, patience"):
             Recovery(**bad)
 

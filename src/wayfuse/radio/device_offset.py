@@ -1,7 +1,7 @@
 r"""Phones differ: the RSS offset of a device, per band, estimated while it is tracked.
 
-Two phones at one place read levels several decibels apart (a Galaxy A5 and an S7 of ipin2023: 7.9 dB at 2.4 GHz, 2.4 dB
-at 5 GHz), by an amount that hardly depends on the place. So the offset is a state of the track: for each band a grid
+Two phones at one place read levels several decibels apart (a Galaxy A5 and an S7 of ipin2023: about 8 dB at 2.4 GHz, 2
+to 4 dB at 5 GHz), by an amount that hardly depends on the place. So the offset is a state of the track: for each band a grid
 of shifts, and for each shift a cost, the signal distance of the nearest fingerprints to the scan so shifted, summed
 over scans. The posterior of a shift is
 

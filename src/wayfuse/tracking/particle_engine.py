@@ -61,9 +61,14 @@ class Recovery:
     lost: float = 60.0
 
     def __post_init__(self) -> None:
-        shares = (self.injection, self.injection_least, self.reset_share)
-        if not (all(0.0 <= share <= 1.0 for share in shares) and self.patience >= 1):
-            raise ConfigError("injection and reset_share are shares, patience at least 1", where="Recovery")
+        shares = (self.reset_share, self.hold, self.hold_start, self.hold_height, self.hold_moving)
+        is_share = (
+            all(0.0 <= share <= 1.0 for share in shares) and min(self.injection, self.injection_least) >= 0.0
+        )
+        if not (is_share and self.injection + self.injection_least < 1.0 and self.patience >= 1):
+            raise ConfigError(
+                "injection, reset_share and hold are shares, patience at least 1", where="Recovery"
+            )
 
     @property
     def injects(self) -> bool:
