@@ -144,7 +144,6 @@ def test_unknown_access_points_change_nothing(world: Any, scans: list[Fingerprin
     strange = scans[5]._replace(bssid=scans[5].bssid ^ np.uint64(0xF0_00_00_00_00_00))
     after = device.step(state, SparseKnn(world.survey), strange)
     np.testing.assert_array_equal(after.cost, state.cost)
-    assert after.n_judged == state.n_judged
     some = scans[5]
     n = len(some.bssid)
     mixed = Fingerprint(
@@ -180,7 +179,7 @@ def test_states_are_values_and_scans_are_judged_now_and_then(world: Any, scans: 
         np.testing.assert_array_equal(state.cost, kept)
         again = device.step(state, radio_map, scan)
         np.testing.assert_array_equal(again.cost, after.cost)
-        judged.append(after.n_judged - state.n_judged)
+        judged.append(int(np.any(after.cost != state.cost)))
         state = after
     assert judged == [1, 1, 1, 1, 0, 0, 0, 1, 0, 0, 0, 1]
     assert state.n_seen == 12

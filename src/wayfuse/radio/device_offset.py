@@ -1,9 +1,9 @@
 r"""Phones differ: the RSS offset of a device, per band, estimated while it is tracked.
 
-Two phones at one place read levels several decibels apart (a Galaxy A5 and an S7 of ipin2023: about 8 dB at 2.4 GHz, 2
-to 4 dB at 5 GHz), by an amount that hardly depends on the place. So the offset is a state of the track: for each band a grid
-of shifts, and for each shift a cost, the signal distance of the nearest fingerprints to the scan so shifted, summed
-over scans. The posterior of a shift is
+Two phones at one place read levels several decibels apart (a Galaxy A5 and an S7 of ipin2023: about 8 dB at
+2.4 GHz, 2 to 4 dB at 5 GHz), by an amount that hardly depends on the place. So the offset is a state of the track:
+for each band a grid of shifts, and for each shift a cost, the signal distance of the nearest fingerprints to the
+scan so shifted, summed over scans. The posterior of a shift is
 
 .. math:: p(s) \propto \exp\Big(-\frac{s^2}{2 \sigma_b^2} - \frac{1}{T} \sum_i \bar d_i(s)\Big)
 
@@ -42,10 +42,9 @@ def shifted(fingerprint: Fingerprint, shift: Array) -> Fingerprint:
 
 
 class OffsetState(NamedTuple):
-    """What is known of a device: cost (N_BANDS, n_shifts), scans judged, scans seen. A value."""
+    """What is known of a device: cost (N_BANDS, n_shifts), scans seen. A value."""
 
     cost: Array
-    n_judged: int = 0
     n_seen: int = 0
 
 
@@ -127,4 +126,4 @@ class DeviceOffset:
         prior = self.init().cost
         fade = np.exp(-1.0 / self.memory)
         gain = (added - added.min(axis=1, keepdims=True)) / self.temperature
-        return state._replace(cost=prior + fade * (state.cost - prior) + gain, n_judged=state.n_judged + 1)
+        return state._replace(cost=prior + fade * (state.cost - prior) + gain)

@@ -30,6 +30,8 @@ from wayfuse.radio.twins import twin_shares
 
 __all__ = ["Neighbours", "SparseKnn", "fix_of"]
 
+_LANES = 16
+
 
 class Neighbours(NamedTuple):
     """The k nearest fingerprints: x, y (k,) m, floor (k,), weight (k,) summing to 1.
@@ -147,7 +149,10 @@ class SparseKnn:
         known = column >= 0
         if not np.any(known):
             return None
-        column, value = column[known], self._represent(rssi[known])
+        column, versions = column[known], rssi.shape[1]
+        # whole vectors of the processor: the innermost loop goes over versions
+        value = np.zeros((len(column), -(-versions // _LANES) * _LANES), np.float32)
+        value[:, :versions] = self._represent(rssi[known])
         out = np.empty(value.shape[1], np.float32)
         best = np.empty((value.shape[1], k), np.float32)
         nearest_mean_distances(
@@ -161,7 +166,7 @@ class SparseKnn:
             best,
             out,
         )
-        return out
+        return out[:versions]
 
     def locate(self, fingerprint: Fingerprint) -> Fix | None:
         """Weighted mean of the neighbours on the heaviest floor; None where no access point is known."""
