@@ -9,7 +9,7 @@ from wayfuse.core.errors import ConfigError
 from wayfuse.core.philox import Noise
 from wayfuse.evaluation.results_folds import in_turn
 from wayfuse.papers import he2014 as paper
-from wayfuse.papers.reproduction import Reproduction
+from wayfuse.papers.reproduction import Reproduction, page
 from wayfuse.presets import he2014
 from wayfuse.radio.gp_field import GpField
 
@@ -51,7 +51,7 @@ def test_bars_lost_runs_and_page_are_whole(result: Reproduction) -> None:
     assert len(result.lost) == 12
     assert "0 of 8 runs" in result.lost[8]  # one access point, true start
     for word in ("Eq. 1", "Eq. 2", "Eq. 4", "misprint", "(F)", "(T)"):
-        assert word in paper.PAGE
+        assert word in page("he2014")
 
 
 def test_the_start_is_the_mean_of_the_nearest_fingerprints() -> None:

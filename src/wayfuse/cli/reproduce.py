@@ -34,7 +34,7 @@ def reproduce(
 
     from wayfuse.cli.results import make_mapper
     from wayfuse.core.errors import UsageError
-    from wayfuse.papers.reproduction import PAPERS, paper
+    from wayfuse.papers.reproduction import PAPERS, page, paper
 
     done = []
     for name in PAPERS if preset == "all" else (preset,):
@@ -50,7 +50,7 @@ def reproduce(
             click.echo(line)
         if out is not None:
             out.mkdir(parents=True, exist_ok=True)
-            (out / f"{name}.md").write_text(module.PAGE.rstrip() + "\n\n" + _page(result), encoding="utf-8")
+            (out / f"{name}.md").write_text(page(name).rstrip() + "\n\n" + _page(result), encoding="utf-8")
             click.echo(f"written to {out / f'{name}.md'}")
     if json_file is not None:
         document = json.dumps([r.plain() for r in done], indent=1, allow_nan=False)

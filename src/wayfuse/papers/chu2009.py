@@ -16,7 +16,7 @@ from wayfuse.papers.reproduction import Interval, Reproduction, Table, mean_inte
 from wayfuse.presets.chu2009 import Config, GridMap, nnss, pf_mcl, pfmm
 from wayfuse.simulator.chu2009_world import FieldModel, draw_field, room_walls, walk
 
-__all__ = ["PAGE", "SEEDS", "Experiment", "reproduce"]
+__all__ = ["SEEDS", "Experiment", "reproduce"]
 
 SEEDS = 20
 METHODS = ("NNSS", "PF_MCL", "PFMM")
@@ -177,34 +177,3 @@ def _bars(errors: Mapping[tuple[str, float], Array], n_lost: int) -> tuple[Bar, 
     bars.append(at_most("PFMM: 30 % of distance over 30 degrees", 1.0, distance / angle, "of", strict=True))
     bars.append(at_most("PFMM: lost runs", 0.0, float(n_lost), "runs"))
     return tuple(bars)
-
-
-PAGE = """# chu2009
-
-J.-H. Chu, *Wireless location tracking by a sensor-enhanced particle filter in 2.5D buildings*, master's thesis, National Chiao
-Tung University, 2009: a particle filter that takes displacements from a phone's sensors and filters particles that pass a wall
-(PFMM), against one without (PF_MCL) and nearest neighbours in signal space (NNSS), in a simulated field. Its third chapter, stairs
-and lifts, is part of `fused`: [methods](../methods.md#between-floors).
-
-| equation | function | test |
-|---|---|---|
-| 4.1-4.5, RIM | `simulator.chu2009_world.draw_field` | `tests/papers/test_chu2009.py` |
-| 3.3, displacement and disc | `models.motion.displaced_disc.DisplacedDisc` | `tests/contracts`, `tests/papers/test_chu2009.py` |
-| 3.3.2, wall filter with widening retry | `filters.widening.WideningFilter`, `models.constraint.barriers.Barriers` | `tests/filters/test_widening.py` |
-| 3.4, speed filter | `models.constraint.speed_filter` (off here) | `tests/models/test_speed_filter.py` |
-| 3.6-3.7, Gaussian kernel on interpolated fingerprints | `presets.chu2009.GridMap.at`, `pfmm` | `tests/papers/test_chu2009.py` |
-| 3.5, resampling by proportional copies | `filters.resampling.systematic` (n w / W is no whole number) | `tests/filters/test_resampling.py` |
-
-**Not printed in the thesis, chosen here:** the walls of Figure 4.1 (twelve rooms, doors of 4 m), the walk (random way points in line
-of sight), which access points the first 4, 6, 8 are (they surround the field), the width of the kernel (the noise, at least 1 dB),
-r_max (3 m; 8 m for PF_MCL at 5 m/s), the start (uniform over the field), the noise of the sensors (none but in Figure 4.6), the
-Weibull variable (shape and scale 1, random sign). The estimate is the weighted mean; "the particle with maximum weight" of Section
-3.3 is `Config(estimate="best")`, with which the ratios are nearer to the thesis' and the bound of 3 m breaks from 5 dB on.
-
-**Misprints:** Eq. 3.7 has sqrt(2 pi sigma) for sqrt(2 pi) sigma (it cancels); Eq. 3.4 has k + 1 terms and uses a speed as a radius,
-which deletes every particle of a halted user; Eq. 4.2 scales a level in dBm; Eq. 4.4 calls a Weibull variable zero-mean.
-
-**Not reproduced:** Figure 4.4 (its curve for 3 dB is flatter than that for 0 dB only if the radio map lacks the pattern of
-irregularity); the building of chapter 5, of which neither plan nor recordings are public. All is simulation: nothing was fitted to
-a row, and every bar is a test of the orders the thesis states.
-"""

@@ -19,7 +19,7 @@ from wayfuse.presets import he2014
 from wayfuse.radio.gp_field import GpField, fit_gp_field
 from wayfuse.simulator.he2014_world import Room, sense, strength, survey_places, true_walk
 
-__all__ = ["PAGE", "SEEDS", "reproduce"]
+__all__ = ["SEEDS", "reproduce"]
 
 SEEDS = 40
 TABLE_1 = (14.8, 7.4, 6.5, 3.8)  # m, for 1 to 4 access points
@@ -44,81 +44,6 @@ VARIANTS = {
     "k = 1": (ROOM, replace(CONFIG, k=1)),
 }
 EXACT = replace(ROOM, length_sigma=0.0, compass_sigma=0.0, yaw_sigma=0.0)
-PAGE = """
-# he2014
-
-X. He, J. Li and D. Aloi, *WiFi based indoor localization with adaptive motion model using smartphone motion sensors*,
-ICCVE 2014. A particle filter on a Gaussian-process radio map; particles move in a disc of 1 m while the user stands,
-and as steps and heading say while the user walks. Simulated in an empty room of 40 m by 40 m with one to four access
-points (Table 1, Figure 12), then tried in a library with a phone (Table 2).
-
-Table 2 and Figure 13 are of one unpublished recording: not reproduced. The simulation took its signals from a
-commercial ray tracer and prints none of them: the room here is ray-traced by images.
-
-## From equation to test
-
-Functions below `wayfuse`; tests in the folder of tests/ that is named as the room.
-
-| paper | function | test |
-|---|---|---|
-| Sec. II: Gaussian process of the signals | `radio.gp_field.fit_gp_field` | test_gp_field.py |
-| Sec. II: start from the k nearest fingerprints | `presets.he2014.nearest_start` | test_he2014.py |
-| Sec. II-A (1), Eq. 1: standing or walking, psi | `inertial.stage_transition.find_stages` | test_stage_transition.py |
-| Sec. II-A (2): steps by the most frequent lag | `inertial.stage_transition.walks` | test_stage_transition.py |
-| Eq. 2: stride | `inertial.stage_transition.stride` | test_stage_transition.py |
-| Sec. II-A (3): compass at the start, then the gyro's yaw | `presets.he2014.headings` | test_he2014.py |
-| Eq. 3, Sec. II-B: resampling at every epoch, mean of the particles | `presets.he2014.track` | test_he2014.py |
-| Eq. 4, Eq. 5, disc of 1 m | `models.motion.adaptive.AdaptiveMotion` | test_adaptive_motion.py |
-| Sec. III, Figure 8: the room | `simulator.he2014_world` | test_sim_images.py |
-
-## What the paper leaves open, and what was taken
-
-- Places of the access points: (2, 2), (38, 38), (38, 2), (2, 38), at 2.5 m; the phone at 1.2 m, the room 3 m high.
-  n access points are n in this order, every one in turn as the first; the errors of the four sets are averaged.
-- Walls, floor and ceiling: relative permittivity 5, at most 2 reflections, 2.437 GHz. The strength is the sum of the
-  powers of the rays. The power of their sum fades by 6 dB and more within a metre, which a survey every 3 m
-  cannot resolve: it does not give the paper's row (table below).
-- Survey every 3 m from 1.5 m (169 places). Its readings are the ray tracer's own, **without noise**; those on the walk
-  have 2.2 dB. This split and the number were chosen so that the row of Table 1 comes out (F). With a survey as noisy
-  as the walk the likelihood is wider and, without a motion model, the cloud lags behind the user: the error with four
-  access points grows (table below).
-- Gaussian process: constant mean, squared exponential, parameters of the highest marginal likelihood per access point,
-  but never less than 1 dB of noise (a survey free of noise would make the filter believe readings to 0.1 dB; for what
-  that does, see the table below). Chosen with Table 1 in view.
-- Path: (4.5, 4.5), (15, 4.5), (15, 10.5), (25.5, 10.5); the ends are the paper's. 1 m per epoch, 27 epochs.
-- 1000 particles, k = 3, noises of Eq. 4 and 5 0.1 m and 0.1 rad per epoch, one set for all rows. Measured moves have
-  an error of 0.1 m, the compass one of 0.1 rad for the whole walk, the gyro's yaw 0.02 rad. These errors were chosen
-  after a trial with exact moves, in which the motion model from the k-NN start gains a little with two access points
-  already (Table 1, last row): the bar "no gain with two" is as weak as that. Moves are simulated, accelerations are not:
-  `inertial.stage_transition` is tested on its own.
-- Errors are means over the epochs 1 to 27; the start, which is told in one row, does not count.
-
-## Departures, misprints and gaps
-
-- The mean of a cloud with two peaks is no estimate of either: with one access point the cloud is a part of a ring, and
-  its mean lies inside. This is a good part of the 14.8 m; the estimate is kept as printed.
-- Figure 12 ("motion information successfully helps") **needs the true start**. From the k-NN start, as Section II
-  describes, the motion model with one access point carries the wrong start along: k-NN with one reading gives a
-  place anywhere on a ring, all particles begin there, and 27 m of walk do not bring them to the right place. Without
-  the motion model the cloud at least wanders along the ring. Both are shown.
-- A disc of radius 1 m moves a particle by 2/3 m on average: without a motion model the cloud cannot follow 1 m per
-  epoch but by selection, and lags.
-- Eq. 2 has no unit. 0.98 times the cube root of the mean acceleration gives 0.6 m for 0.25 g and 1.3 m for the same in
-  m/s2: units of gravity were taken, which also suit the threshold of 0.01. "Stride" is then a single step. The text
-  before Eq. 4 cites [4] for what is plain dead reckoning.
-- The rate is not printed. At 100 Hz the lags of 30 to 60 samples are 0.3 to 0.6 s, one step; at 50 Hz two steps.
-  Measured on the validation walks of oxford-steps (12 walks): at 100 Hz the count errs by less than 1 % with the phone
-  in the hand, as the paper holds it, but misses two steps of three or more in trouser pockets, where only pairs of steps
-  repeat; at 50 Hz with two steps per period the mean error over all carrying positions is 4 %.
-- As printed, psi needs two windows ahead, so each walk loses the samples of its last two windows.
-
-## Why figures differ
-
-The paper prints no seeds and no intervals: its row may be one run of 27 epochs for each number of access points, and
-single runs scatter by several metres (one access point: 6 m or 18 m, by which one it is). Geometry and noise are ours.
-Rows marked (F) were used to fit the noise; those marked (T) follow from it and are a test. A lost run is one that ends
-more than 10 m away; none is left out of any figure.
-"""
 _Row = tuple[str | float | Interval, ...]
 
 

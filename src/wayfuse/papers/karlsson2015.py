@@ -26,7 +26,7 @@ from wayfuse.presets import karlsson2015 as preset
 from wayfuse.radio.band_correlation import fisher_interval
 from wayfuse.simulator import karlsson2015_world as world
 
-__all__ = ["PAGE", "SEEDS", "reproduce"]
+__all__ = ["SEEDS", "reproduce"]
 
 SEEDS = 40
 _TABLE_2 = {"2.4 and 5 GHz": (1.7, 4.5, 1.6), "2.4 GHz": (2.6, 5.3, 2.5), "5 GHz": (2.9, 5.8, 2.9)}
@@ -37,7 +37,7 @@ _FIRST_STEPS = 20  # in which the heading is found (Figure 3)
 
 
 def reproduce(seeds: Sequence[int], mapper: Mapper) -> Reproduction:
-    """All tables, each seed its own noise; the places of walks and access points are the same. Real data where present."""
+    """All tables, each seed its own noise, walks and access points at the same places; real data where present."""
     runs = list(mapper(one_seed, list(seeds), "karlsson2015"))
     short = {row: [run.short[row] for run in runs] for row in _TABLE_2}
     long = {row: [run.long[row] for run in runs] for row in (*_TABLE_3, GAUSS_NEWTON)}
@@ -238,85 +238,3 @@ def _lost(errors: dict[str, list[Array]]) -> list[str]:
         for row, n in counts.items()
         if n and row.endswith("GHz")
     ]
-
-
-PAGE = """# karlsson2015
-
-Karlsson, Karlsson, Bernhardsson, Tufvesson and Persson, *Sensor Fused Indoor Positioning Using Dual Band WiFi Signal
-Measurements*, European Control Conference 2015, 10.1109/ECC.2015.7330777: a particle filter on the path loss of access
-points whose places and powers are known, on both bands, and on counted steps and gyroscope turns from an unknown start.
-It shows that the errors of the two bands are nearly uncorrelated, that two bands beat one, and that steps and Wi-Fi
-together beat each alone.
-
-## Equation, function, test
-
-| paper | function | test |
-|---|---|---|
-| Table I, correlation | `radio.band_correlation.correlate` | `tests/radio/test_band_correlation.py` |
-| Table I, intervals | `radio.band_correlation.fisher_interval` | `tests/radio/test_band_correlation.py` |
-| Eq. 1, path loss | `radio.path_loss.PathLoss`, `fit_path_loss` | `tests/radio/test_path_loss.py` |
-| section III, weights | `radio.path_loss.log_likelihood` | `tests/radio/test_path_loss.py` |
-| section IV, "LS" | `radio.path_loss_trilateration.linearised_fix` | `tests/radio/test_path_loss.py` |
-| Eq. 2, steps and turns | `models.motion.step_count.StepCountMotion` | `tests/papers/test_karlsson2015.py` |
-| section IV, step counter | `inertial.derivative_steps.count_steps` | `tests/inertial/test_derivative_steps.py` |
-| section IV, turns | `inertial.derivative_steps.turns_about_gravity` | `tests/inertial/test_derivative_steps.py` |
-| section III, PF | `presets.karlsson2015.wifi_only` | `tests/papers/test_karlsson2015.py` |
-| section IV, PF with PDR | `presets.karlsson2015.fused` | `tests/papers/test_karlsson2015.py` |
-| section IV, PDR only | `presets.karlsson2015.dead_reckoning` | `tests/papers/test_karlsson2015.py` |
-
-The filters of Table III get steps and turns from the simulated walker, steps counted without error. The step counter
-itself was held against the counted walks of oxford-steps: see below.
-
-## Misprints and gaps
-
-- Eq. 1 prints log10 P on both sides where the terms are decibels: as printed it is off by a factor of ten. Read as
-  10 log10 P.
-- "Table II" and "Table III" in the text mean Tables I and II where the correlation and the bands are discussed.
-- Eq. 2 has one r_k for all N steps, so that the noise of a distance grows with N; and a particle moves with its heading
-  before the turn. We make an event of each step (N = 1), as section IV says that estimates come between the scans.
-- Not printed: sigma, alpha and the powers; the number of particles, sigma_r, sigma_v; the random walk; which least
-  squares; the buildings, the paths but for length, start and first direction, the places of the access points; the
-  numbers of pairs of Table I; the threshold of the step counter.
-
-## What was fitted, and what is a test
-
-Each experiment of the paper is one walk in one building, of which it gives lengths and counts. Ours are simulated
-walks in made-up buildings with the printed counts; the filter knows the simulator's alpha and sigma. **F** marks the
-rows to which an unprinted number was fitted, **T** a row that then followed, **T?** one where a choice was made with
-the row in view.
-
-- sigma 3.5 dB (2.4 GHz) and 4.5 dB (5 GHz), half of the variance correlated over 3 m of walk: F on the two single bands
-  of Table II. Both bands together are T.
-- Random walk 0.84 m per root second and axis, one value for 0.5 m (Table II) and 4 s (Table III) between scans: F on
-  the PF with Wi-Fi only. It is more lag than radio noise and very sensitive, see the table below.
-- Heading drift of the phone 0.0009 rad per step and 2 % of step length: F on PDR only.
-- The building of Table III is one of three that were tried with its rows in view; the other two are shown. The
-  fused row is T for given buildings and weak beyond that: 1.3 to 1.9 m.
-- "LS" is the linearised one (T?): Gauss-Newton, weighted with the range errors, gives half the paper's error.
-- alpha 0.15 and 0.25 dB/m, powers -35 and -40 dBm, cut-off -90 and -85 dBm, sigma_r 0.1 m, sigma_v 0.1 rad, 2000
-  particles: from an earlier prototype, which had all rows of both tables before it. So the T rows, too, are a weak
-  test. alpha and sigma are also estimated from a survey, in the last table.
-
-The fits of the F rows used seeds 1000 to 1059, the figures below use seeds 0 to 39. With the first choice (3.6 dB,
-4.8 dB, 0.86) the F rows were off by up to 0.25 m on those seeds; on seeds 0 to 39 it gave 2.00 m for both bands and
-1.40 m for the fused row, and all bars held as well.
-
-## Why figures differ
-
-- Both bands stay above 1.7 m: two independent bands of 2.6 and 2.9 m combine to 1.9. The paper's single walk may well
-  scatter to 1.7: single runs of ours have a standard deviation of 0.3 m.
-- Maxima are those of one walk in the paper, means of maxima here, and have no bar. PF with Wi-Fi only reaches 11.6 m in
-  the paper, presumably in the first scans or where its building hides access points; PDR only is more uneven here.
-- The paper's NLOS stationary series has an interval that excludes 0, though the text calls the bands uncorrelated.
-  Fisher's interval supposes independent pairs; the second table shows what becomes of it when errors outlast a scan.
-- "Less than 1 % error" in hand, pocket and bag: on the 12 validation walks of oxford-steps, with one threshold of
-  8 m/s³ (chosen with them in view), the mean error is 0.3 % in the hand, 0.9 % on the neck, 3 % in a bag and on the
-  arm, but 12 % in a front and 34 % in a back pocket, too many nearly always. The paper does not say which pocket.
-- Real data (last two tables) do not bear the claim out in general. At surveyed points of two buildings whose access
-  points' places are published, the samples of one point are nearly uncorrelated between the bands, as in the paper,
-  but the errors from point to point are not: r is 0.6 to 0.7, for the same walls stand in the way of both, and their
-  sigma is 8 dB. A fix of one scan then gains little or nothing from the second band. The paper's series 1 to 4 are
-  of single walks with a coefficient of up to 0.26, which its intervals leave open to 0.55.
-- The gain of the second band shrinks as the errors get correlated, and is small from 0.75 on; the filter, which counts
-  the bands as independent, is then overconfident as well.
-"""

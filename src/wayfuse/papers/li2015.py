@@ -34,7 +34,7 @@ from wayfuse.simulator.li2015_world import (
     simulate_run,
 )
 
-__all__ = ["PAGE", "SEEDS", "Experiment", "reproduce"]
+__all__ = ["SEEDS", "Experiment", "reproduce"]
 
 SEEDS = 20
 _LOST = 6.0  # m; a run whose mean error is above it is counted as lost, and stays in every figure
@@ -195,7 +195,10 @@ def _further(figures: _Figures) -> Table:
             (1, 0),
         )
     ]
-    note = "Not in the paper. With a sigma_v that steps and a good compass deserve FW-PF is better than reported, but follows a bad compass."
+    note = (
+        "Not in the paper. With a sigma_v that steps and a good compass deserve FW-PF is better than reported, "
+        "but follows a bad compass."
+    )
     return Table("Further rows", ("row", "mean, m", "sd, m", "90 %, m"), tuple(rows), note)
 
 
@@ -250,73 +253,3 @@ def _captures(folder: Path) -> tuple[Table, list[Bar]]:
     )
     mean = float(errors["direct path, mean over antennas"].mean())
     return Table(title, columns, rows, note), [at_most("range of real captures, mean", 0.3, mean, "m")]
-
-
-PAGE = """# li2015: ranges from channel state and a velocity in a particle filter
-
-Z. Li, D. Burbano, Z. Zhao, J. L. Carrera, T. Braun, *Fine-grained Indoor Tracking by Fusing Inertial Sensor and
-Physical Layer Information in WLANs*, University of Bern, INF-15-004, December 2015.
-
-Anchors hear the packets of a target and report the channel state of each. The strongest tap of the impulse response
-gives a range by regression; ranges and a velocity from step length and compass weigh the particles of a
-constant-velocity model. Far ranges count less, by exponents 1/d. The preset is `presets/li2015.py`: FW-PF (`Config`),
-R-PF (`R_PF`: no velocity) and PDR (`dead_reckon`).
-
-## Equation, function, test
-
-| paper | function | test |
-|---|---|---|
-| Eq. 3-4 | `models.motion.constant_velocity.ConstantVelocity` | tests/models/test_range_likelihood.py |
-| Eq. 7 | `models.observation.ranges.VelocityLikelihood` | tests/models/test_range_likelihood.py |
-| Eq. 8-11 | `models.observation.ranges.RangeLikelihood` | tests/models/test_range_likelihood.py |
-| Eq. 12 | `models.observation.ranges.range_exponents` | tests/models/test_range_likelihood.py |
-| Section 5.1, CIR by IFFT, power of the direct path | `radio.csi` | tests/radio/test_ranging.py |
-| Section 5.1, regression, mean over antennas | `radio.ranging` | tests/radio/test_ranging.py |
-| Section 6.2, logs of the anchors' cards | `formats.intel5300.read` | tests/formats/test_read_intel5300.py |
-| Algorithm 1 | `presets.li2015.track` | tests/papers/test_li2015.py |
-| reference [4], WC-CWLS | `radio.multilateration` | tests/radio/test_ranging.py |
-| Section 7.1 | `simulator.li2015_world` | tests/papers/test_li2015.py |
-
-Not here: the velocity from raw sensors (Eq. 13-17). The simulated velocity takes its place, with errors of heading and
-speed; no public recording has channel state at several anchors together with a phone's sensors.
-
-## Misprints, gaps and what was chosen
-
-- Eq. 7: the factor must be 1/(2 pi sigma_v^2); it cancels. The sigmas are called variances and used as standard
-  deviations. Algorithm 1 has a stray p in step 5.
-- Step 6 leaves out the weights of before, which Eq. 2 has; that is wrong wherever no resampling took place. Here they
-  are kept.
-- The text after Eq. 6 writes y_k where x_k is meant.
-- The exponents sum to 1, so N ranges together weigh as one against the velocity's full say. A wide sigma_v balances it.
-- Not printed: all sigmas, w, the number of particles, the interval, the start, walls and scale of Figure 6. Chosen:
-  sigma_j 2 m, w 0.5 m/s^2, 1000 particles, 1 s, a known start (0.5 m). A floor of 30 x 16 m, a corridor between two
-  rows of rooms, three paths of 40 to 50 m.
-- Whether R-PF has the exponents is not said. The text gives them as a reason for FW-PF's lead, so R-PF is taken without
-  (Eq. 8); with them it is a further row.
-
-## What was fitted, what is a test
-
-The paper is one data set of one building, not public; the world is ours, so it was fitted:
-
-- to R-PF: errors of ranges, line of sight N(0, 0.8 m), through a wall N(1.2, 2.0) with 4 and N(1.35, 2.2) with 5 anchors.
-- to FW-PF (5 ANs): sigma_v 1.8 m/s, the places of the five anchors and the shape of the paths. With the fifth anchor in
-  the middle of the corridor, always near and in sight, FW-PF (5 ANs) was 1.1 m.
-- to PDR: errors of the heading. A median of 0.5 m with 4 m at 90 % is no single normal, so a quarter of the runs have a
-  bad compass.
-
-FW-PF (4 ANs) followed, and is the only test of Table 1, a weak one. The effect of the exponents was not fitted.
-
-## Why figures differ
-
-- FW-PF with 4 anchors is better than printed, and the sd of R-PF with 5 anchors (1.5 m, without a bar) is not reached.
-  Errors of ranges are white here; real ones last for as long as a wall is in between, which we take for the cause.
-- Exponents 1/d help when what is far is also behind walls, or has an error that grows with range, as ranges from power
-  have. With independent errors of one size (ranges by time of flight) they harm: they throw away what far anchors know.
-- With the sigma_v that steps and a good compass deserve (0.3 m/s) FW-PF is better than the paper reports on average, but
-  follows a bad compass: about 1 run in 100 is lost, none at 1.8 m/s.
-- Channel state gives no better ranges than the received power alone on the public captures: one room, line of sight,
-  1 to 4.5 m. At 20 MHz one tap is 15 m of path wide.
-
-No recovery from a lost track is in the paper, nor here; runs with a mean error above 6 m are listed, and stay in every
-figure.
-"""

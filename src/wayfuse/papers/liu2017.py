@@ -23,7 +23,7 @@ from wayfuse.presets.liu2017 import (
 )
 from wayfuse.simulator.liu2017_world import Office, Survey, Walk, World, office, survey, walk
 
-__all__ = ["PAGE", "SEEDS", "Runs", "reproduce"]
+__all__ = ["SEEDS", "Runs", "reproduce"]
 
 SEEDS = 20
 _PAPER = {"wifi": 5.22, "imu": 27.5, "fused": 2.67, "fingerprints": 2.35}  # m, Sec. IV-B and IV-E
@@ -36,84 +36,8 @@ _DISTANCE_SIGMAS = (0.1, 0.2, 0.4, 0.8, 1.2)  # Fig. 5(c)
 _TURN_SIGMAS = (0.001, 0.01, 0.1, 0.3)  # Fig. 5(c)
 _NEIGHBOURS = (1, 4, 16, 32)  # Fig. 6(c)
 _EVERY = (1, 2, 4, 8)  # Fig. 7: 1/2, 1/4, 1/8, 1/16 Hz
-_FAST = World(speed_factor=1.3)  # 1.01 m/s, Sec. IV-F; at 1.00 m/s a lap would be 27 scans, see PAGE
+_FAST = World(speed_factor=1.3)  # 1.01 m/s, Sec. IV-F; at 1.00 m/s a lap would be 27 scans, see its page
 _OTHER_PHONE = World(device_sigma=3.0)  # ours: nothing is printed of how the phones differ
-
-
-PAGE = """# liu2017: sequences of access points and dead reckoning
-
-R. Liu, C. Yuen, T.-N. Do, Y. Jiang, X. Liu, U-X. Tan, *Indoor Positioning using Similarity-based Sequence and Dead
-Reckoning without Training*, 2017. A place is known by the order of its distances to access points of known position, a
-scan by the order of its strengths; Kendall's tau compares them. A particle filter joins that with the phone's step
-count and orientation. No survey is needed.
-
-## Equation, function, test
-
-| paper | function | test |
-|---|---|---|
-| Sec. II-A, grid of location sequences | `radio.ap_sequence.from_positions`, `location_sequence` | `tests/radio/test_ap_sequence.py` |
-| Sec. II-B, RSS sequence | `radio.ap_sequence.rss_sequence` | the same: the examples of Figures 1 and 3 |
-| Eq. 1, predict, correct, resample | `presets.liu2017.fused` | `tests/papers/test_liu2017.py` |
-| Eq. 2, weighted k nearest neighbours | `radio.ap_sequence.nearest`, `kernel_log_likelihood` | `tests/radio/test_ap_sequence.py` |
-| Eq. 3, bandwidth lambda | `presets.liu2017.Config.precision` | the table of Section IV, both readings |
-| Eq. 4, Kendall's tau | `radio.ap_sequence.kendall_tau` | property tests against `scipy.stats.kendalltau` |
-| Eq. 5 to 7, motion | `presets.liu2017.fused`, `dead_reckoning` | without noise the filter is dead reckoning |
-| Sec. III-C, step count of [9] (Zee) | `inertial.autocorrelation_steps` | `tests/inertial/test_autocorrelation_steps.py` |
-| Sec. IV-E, cosine fingerprints | `presets.liu2017.fingerprint_neighbours`, `radio.knn.distances` | the table of Section IV |
-
-## Misprints, gaps and what stands in their place
-
-- **Eq. 3 (misprint).** As printed lambda divides: with lambda = 0.01 a kernel of 0.1 m. Then fingerprints become several
-  times better than reported. Multiplying gives a kernel of 10 m and all four rows of Section IV, so that is the preset;
-  `bandwidth_divides=True` is Eq. 3 as printed.
-- **Log domain.** A kernel of 0.1 m is 0 in double precision for whoever stands 4 m from all k cells: the filter would
-  divide 0 by 0. The kernel is summed in logarithms and has no such limit.
-- **Ties in Eq. 4.** Nine access points give 37 values of tau, and a symmetric grid has equal distances. A tied pair counts
-  neither way and the divisor is that of Eq. 4: tau-a. tau-b is an option (`tau="b"`). Cells that tie for the last of the k
-  ranks share what is left of the k, so that the order of the grid does not matter.
-- **Unheard access points** (not treated): they come after all that are heard, tied with each other.
-- **Sequence.** 3421 of Figure 1 is read as ranks in the order of the access points, which alone makes Eq. 4 a Kendall tau.
-- **Eq. 5 and 6** move by the heading *before* the turn, and draw a noise for each axis; kept as printed.
-- **Eq. 7** has noise in proportion to the turn: on a straight side a wrong heading is never put right. Kept.
-- **Wi-Fi alone** needs a motion model, which is not given: a random walk of 1.75 m per axis and scan. Its figure is the
-  lag of that walk more than radio noise (0.8 m gives 6.9, 3.2 m gives 3.7).
-- **Cosine**: of RSS + 100, unheard as 0; the offset is not given.
-- **Step count.** The world below gives counts, so that the figures do not depend on a simulated gait. The counter of
-  Section III-C stands apart: on the 12 counted validation walks of oxford-steps its mean error is 0.9 %.
-- **Start**: the true pose, for all rows; the estimate is the weighted mean before resampling, resampling systematic and
-  after every scan.
-
-## The world
-
-`simulator.liu2017_world` has what the paper gives (25 m x 14 m, nine access points, 648.2 m in 831 s, a scan in 2 s, 41
-surveyed places of 3 minutes) and what it does not: a rectangle of 19 m x 8 m, access points on a 3 x 3 grid one metre
-from the walls, surveyed places evenly along the rectangle, exponent 3, shadowing of 6 dB over 3 m, 3 dB per reading in
-whole dBm, true step 0.7 m.
-
-An error of 27.5 m of dead reckoning whose steps are fair needs a compass that is wrong in another way on opposite
-sides: 0.296 rad one way on one short side and the other way on the other, which shifts every lap by 4.6 m.
-
-**Fitted (F):** the rows "Wi-Fi alone" (the random walk) and "IMU alone" (the distortion). **Test (T?):** "fused" and
-"fingerprints" follow, but weakly: the sides that are distorted, the grid (four were tried: fused 2.4 to 2.7) and the
-surveyed places (three layouts: 2.5 each) were chosen with these rows in view, on seeds 0 to 15. Twenty fresh seeds then
-gave 5.32, 27.5, 2.67 and 2.46 m. One real data set stands behind the paper's figures, ours is its caricature: orders and
-trends say more than decimals.
-
-Dead reckoning alone is lost in every run, by design; so is the filter with sigma_d = 0.1, which trusts a wrong compass.
-A run counts as lost when its last minute is more than 10 m off on average. Lost runs are in all means.
-
-All figures of the tables below are simulated.
-
-## What does not follow
-
-lambda = 0.01 as the best: multiplying, a kernel of 3 m is better, and lambda = 1, which means the same under both
-readings, is better than 0.01 under both. sigma_d = 0.4 as the best: 0.8 and 1.2 are better, for a wrong compass wants a
-wider cloud. k = 32 as the best on cells of 1 m and k = 4 on 2 m: they hardly differ under so wide a kernel. A faster walk
-as worse: it is as good as a slow one here. None of these has a
-bar. A trap of the faster walk: at 1.00 m/s a lap is 27 scans exactly, Eq. 5 then overshoots the same corners by the same
-piece every lap, and this cancels nearly half of the drift (dead reckoning 15 m, fused 1.8 m); the run of Figure 7 is at
-1.01 m/s, where no lap is like the one before.
-"""
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,15 +1,15 @@
 """What the reproduction of a paper is made of: tables of paper against ours, bars, and words.
 
-A file of this room named as its preset has three things: ``PAGE``, the words of docs/papers/<preset>.md (equation,
-function, test; departures and misprints; why figures differ), ``SEEDS``, how many seeds its figures take, and
-``reproduce(seeds, mapper)``.
+A file of this room named as its preset has ``SEEDS``, how many seeds its figures take, and ``reproduce(seeds,
+mapper)``; pages/<preset>.md has the words of docs/papers/<preset>.md (equation, function, test; departures and
+misprints; why figures differ).
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
-from importlib import import_module
+from importlib import import_module, resources
 from typing import Any, Protocol, cast
 
 import numpy as np
@@ -19,7 +19,7 @@ from wayfuse.core.errors import UsageError
 from wayfuse.evaluation.results_bars import Bar
 from wayfuse.evaluation.results_folds import Mapper
 
-__all__ = ["PAPERS", "Interval", "Paper", "Reproduction", "Table", "mean_interval", "paper"]
+__all__ = ["PAPERS", "Interval", "Paper", "Reproduction", "Table", "mean_interval", "page", "paper"]
 
 PAPERS = ("chu2009", "he2014", "karlsson2015", "li2015", "liu2017")
 _STUDENT = 1.645  # of a normal: two sides, 90 %; with 20 seeds and more Student's differs by less than 5 %
@@ -72,7 +72,6 @@ class Reproduction:
 class Paper(Protocol):
     """A module of this room."""
 
-    PAGE: str
     SEEDS: int
 
     def reproduce(self, seeds: Sequence[int], mapper: Mapper) -> Reproduction:
@@ -95,3 +94,8 @@ def paper(name: str) -> Paper:
         if error.name != f"wayfuse.papers.{name}":
             raise
         raise UsageError(f"{name} is not reproduced yet", where="PRESET", remedy="choose another") from error
+
+
+def page(name: str) -> str:
+    """The words of docs/papers/<name>.md, without the figures."""
+    return (resources.files("wayfuse.papers") / "pages" / f"{name}.md").read_text(encoding="utf-8")
