@@ -1,0 +1,202 @@
+"""Where access points hang: known from a plan, or estimated from a survey (`radio.ap_estimation`).
+
+Read and written as a CSV with the header ``bssid,x,y,floor,height``: places in metres of the frame of the floor, floors
+by name, height above that floor empty where nobody measured it. Estimated places carry a sixth column, ``sigma``, the
+standard deviation of the place in metres; a file that has it holds estimates, and methods say so. This file is made by
+hand or by a command, so a damaged line is an error of use that names file and line, not bad data.
+"""
+
+from __future__ import annotations
+
+import csv
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from os import PathLike
+from pathlib import Path
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wayfuse.core.errors import ConfigError, DataMissingError, FormatError, UsageError
+from wayfuse.core.types import Array, IdArray
+from wayfuse.sensors.records import bssid_id, bssid_text
+
+__all__ = ["ApPlaces", "read_ap_places", "write_ap_places"]
+
+_HEADER = ("bssid", "x", "y", "floor", "height")
+_SIGMA = "sigma"
+_HASHED = 1 << 63  # marks a digest, as `bssid_text` takes it off
+_DIGEST_DIGITS = 16
+_FARTHEST = 1e5  # m; no building frame reaches so far
+_Row: TypeAlias = tuple[int, float, float, int, float, float]  # bssid, x, y, floor, height, sigma
+_REMEDY = "give bssid,x,y,floor,height: metres of the floor's frame, the floor's name, height may be empty"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ApPlaces:
+    """Places of n access points.
+
+    bssid : (n,) identifiers, each once. x, y : (n,) m, frame of the floor. floor : (n,) index into the site's floors.
+    height : (n,) m above that floor, NaN where unknown. is_estimated : estimated from readings, not measured.
+    sigma : (n,) m, standard deviation of an estimated place, NaN where unknown; None for measured places.
+    """
+
+    bssid: IdArray
+    x: Array
+    y: Array
+    floor: NDArray[np.int32]
+    height: Array
+    is_estimated: bool = False
+    sigma: Array | None = None
+
+    def __post_init__(self) -> None:
+        columns = (self.x, self.y, self.floor, self.height, *(() if self.sigma is None else (self.sigma,)))
+        if self.bssid.ndim != 1 or any(column.shape != self.bssid.shape for column in columns):
+            raise ConfigError("columns of different lengths", where="ApPlaces")
+        if len(np.unique(self.bssid)) != len(self.bssid):
+            raise ConfigError("an access point has two places", where="ApPlaces", remedy="keep one of them")
+        if not np.all(np.isfinite(self.x) & np.isfinite(self.y) & (self.floor >= 0)):
+            raise ConfigError("an access point without a place", where="ApPlaces", remedy="leave it out")
+
+    def __len__(self) -> int:
+        return len(self.bssid)
+
+    @property
+    def xy(self) -> Array:
+        """(n, 2) m, frame of the floor of each."""
+        return np.column_stack([self.x, self.y])
+
+    def rows(self, bssid: IdArray) -> NDArray[np.int64]:
+        """Row of each identifier (k,), -1 where its place is not known."""
+        if not len(self.bssid):
+            return np.full(len(bssid), -1, np.int64)
+        order = np.argsort(self.bssid)
+        ascending = self.bssid[order]
+        at = np.minimum(np.searchsorted(ascending, bssid), len(order) - 1)
+        return np.where(ascending[at] == bssid, order[at], -1)
+
+    def select(self, rows: NDArray[np.integer] | NDArray[np.bool_]) -> ApPlaces:
+        """Some of them."""
+        return ApPlaces(
+            self.bssid[rows], self.x[rows], self.y[rows], self.floor[rows], self.height[rows],
+            self.is_estimated, None if self.sigma is None else self.sigma[rows],
+        )  # fmt: skip
+
+
+def read_ap_places(path: str | PathLike[str], floor_names: Sequence[str]) -> ApPlaces:
+    """Read a CSV of places; columns in any order, ``height`` and ``sigma`` may be missing.
+
+    Raises
+    ------
+    DataMissingError : the file cannot be read. FormatError : a line is damaged, names a floor that the site does not
+    have, or an access point for the second time.
+    """
+    path = Path(path)
+    try:
+        text = path.read_text(encoding="utf-8-sig")
+    except OSError as error:
+        raise DataMissingError(f"cannot be read: {error.strerror}", where=path, remedy=_REMEDY) from error
+    except UnicodeDecodeError as error:
+        raise FormatError("is not text in UTF-8", where=path, remedy=_REMEDY) from error
+    lines = csv.reader(text.splitlines())
+    header = [name.strip().lower() for name in next(lines, [])]
+    if not set(_HEADER[:4]) <= set(header):
+        raise FormatError("the header lacks a column", where=f"{path}:1", remedy=_REMEDY)
+    floors = {name: index for index, name in enumerate(floor_names)}
+    seen: dict[int, int] = {}
+    rows: list[_Row] = []
+    for fields in lines:
+        where = f"{path}:{lines.line_num}"
+        if not any(field.strip() for field in fields):
+            continue
+        if len(fields) != len(header):
+            what = f"{len(fields)} fields, the header has {len(header)}"
+            raise FormatError(what, where=where, remedy=_REMEDY)
+        row = _row(dict(zip(header, (field.strip() for field in fields), strict=True)), floors, where)
+        first = seen.setdefault(row[0], lines.line_num)
+        if first != lines.line_num:
+            raise FormatError(
+                f"bssid {bssid_text(row[0])} is in line {first} already", where=where, remedy="keep one"
+            )
+        rows.append(row)
+    return _places(rows, is_estimated=_SIGMA in header)
+
+
+def _row(fields: Mapping[str, str], floors: Mapping[str, int], where: str) -> _Row:
+    if not fields["bssid"]:
+        raise FormatError("bssid is empty", where=where, remedy=_REMEDY)
+    if fields["floor"] not in floors:
+        raise FormatError(
+            f"floor {fields['floor']!r} is none of the site's",
+            where=where,
+            remedy=f"one of {', '.join(floors)}",
+        )
+    x, y, height, sigma = (_number(fields, name, where) for name in ("x", "y", "height", _SIGMA))
+    if sigma < 0.0:
+        raise FormatError(f"sigma {sigma} is negative", where=where, remedy="a standard deviation in metres")
+    return _identifier(fields["bssid"]), x, y, floors[fields["floor"]], height, sigma
+
+
+def _identifier(text: str) -> int:
+    """The inverse of `bssid_text`: digests are written as # and hexadecimal digits."""
+    digits = text.removeprefix("#")
+    if len(digits) == len(text) - 1 == _DIGEST_DIGITS:
+        try:
+            return _HASHED | int(digits, 16)
+        except ValueError:
+            pass
+    return bssid_id(text)
+
+
+def _number(fields: Mapping[str, str], name: str, where: str) -> float:
+    text = fields.get(name, "")
+    if not text and name not in ("x", "y"):
+        return math.nan
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not abs(value) <= _FARTHEST:
+        raise FormatError(f"{name} {text!r} is no length in metres", where=where, remedy=_REMEDY)
+    return value
+
+
+def _places(rows: Sequence[_Row], *, is_estimated: bool) -> ApPlaces:
+    numbers = np.array([row[1:] for row in rows], dtype=np.float64).reshape(-1, 5)
+    x, y, floor, height, sigma = numbers.T
+    return ApPlaces(
+        np.array([row[0] for row in rows], np.uint64), x, y, floor.astype(np.int32), height,
+        is_estimated, sigma if is_estimated else None,
+    )  # fmt: skip
+
+
+def write_ap_places(path: str | PathLike[str], places: ApPlaces, floor_names: Sequence[str]) -> None:
+    """Write places so that `read_ap_places` reads the same to the centimetre.
+
+    Raises
+    ------
+    UsageError : the folder is not there, or the site has fewer floors than the places name.
+    """
+    target = Path(path)
+    if not target.parent.is_dir():
+        raise UsageError(f"there is no folder {target.parent}", where=target, remedy="create it first")
+    if len(places) and int(places.floor.max()) >= len(floor_names):
+        raise UsageError(
+            f"floor {int(places.floor.max())} of {len(floor_names)}",
+            where=target,
+            remedy="places of another site",
+        )
+    with target.open("w", newline="", encoding="utf-8") as stream:
+        out = csv.writer(stream, lineterminator="\n")
+        sigma = np.full(len(places), np.nan) if places.sigma is None else places.sigma
+        out.writerow((*_HEADER, _SIGMA) if places.is_estimated else _HEADER)
+        for row in range(len(places)):
+            fields = [bssid_text(int(places.bssid[row])), _text(places.x[row]), _text(places.y[row]),
+                      floor_names[int(places.floor[row])], _text(places.height[row])]  # fmt: skip
+            out.writerow([*fields, _text(sigma[row])] if places.is_estimated else fields)
+
+
+def _text(value: float) -> str:
+    return f"{value:.2f}" if math.isfinite(value) else ""
