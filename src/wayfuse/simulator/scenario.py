@@ -25,7 +25,7 @@ from wayfuse.simulator.imu import ImuModel
 from wayfuse.simulator.radio_field import RadioModel
 from wayfuse.simulator.rides import LiftModel
 from wayfuse.simulator.scanner import ScannerModel
-from wayfuse.simulator.walker import WalkerModel
+from wayfuse.simulator.walker import Person, WalkerModel
 
 __all__ = ["Scenario", "load_scenario"]
 
@@ -73,6 +73,10 @@ class Scenario:
         moved = self.lift.speed, self.lift.acceleration[0], self.lift.jerk, self.lift.escalator_speed
         if min(moved) <= 0.0:
             raise ConfigError("speeds, acceleration and jerk of the lift must be positive")
+
+    def way_length(self, person: Person, rng: np.random.Generator) -> float:
+        """Length (m) of a walk of the duration drawn; stops and first steps take some of the time."""
+        return float(rng.uniform(*self.duration_s)) * person.step_rate * person.step_length * 0.85
 
     def tracked(self) -> Scenario:
         """The scenario of the walks to track: their phone hears ``tracked_offset_db`` more than the survey's."""

@@ -6,16 +6,17 @@ memory and the same walk read back from its file are equal; `Truth` holds what n
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from wayfuse.core.angles import wrap
 from wayfuse.core.types import Array, IntArray
-from wayfuse.sensors.recording import Device, Recording, Series
+from wayfuse.sensors.recording import Device, Recording
 from wayfuse.sensors.records import Waypoint, WifiScan
 from wayfuse.simulator.building import Building, shopping_centre
-from wayfuse.simulator.imu import ImuSamples, MagneticField, magnetic_field, measure
+from wayfuse.simulator.imu import MagneticField, magnetic_field, measure
+from wayfuse.simulator.phone_columns import sensed
 from wayfuse.simulator.radio_field import RadioField, radio_field
 from wayfuse.simulator.routes import plan_route
 from wayfuse.simulator.scanner import Sweep, scan
@@ -106,12 +107,9 @@ def simulate_walk(
         floor = int(rng.integers(len(site.building.storeys)))
     storey = site.building.storeys[floor]
     person = draw_person(scenario.walker, rng)
-    length = (
-        rng.uniform(*scenario.duration_s) * person.step_rate * person.step_length * 0.85
-    )  # stops, first steps
     route = plan_route(
         storey,
-        length,
+        scenario.way_length(person, rng),
         rng,
         wander=scenario.wander_m,
         pause_share=scenario.pause_share,
@@ -124,13 +122,9 @@ def simulate_walk(
     stated = truth_walk.stated + np.array([0.0, 1.0, 1.0]) * rng.normal(
         0.0, scenario.stated_sigma, truth_walk.stated.shape
     )
-    series = _series(imu, start_ms)
-    recording = Recording(
-        name=name,
-        acceleration=series["acceleration"],
-        rotation_rate=series["rotation_rate"],
-        magnetic_field=series["magnetic_field"],
-        orientation=series["orientation"],
+    base = sensed(name, imu, (start_ms + np.round(1000 * imu.t)) / 1000, DECIMALS)
+    recording = replace(
+        base,
         wifi=tuple(_wifi(sweep, site.radios, start_ms) for sweep in sweeps),
         waypoints=tuple(_stated(row, storey.name, start_ms) for row in stated),
         site=site.building.name,
@@ -151,22 +145,6 @@ def _truth(name: str, floor: int, floor_name: str, w: Walk, start_ms: int) -> Tr
 def _clock(t: float, start_ms: int) -> float:
     """A time of the walk (s) as a phone stamps it: whole milliseconds."""
     return (start_ms + round(1000 * t)) / 1000
-
-
-def _series(imu: ImuSamples, start_ms: int) -> dict[str, Series]:
-    """Columns as the file has them: whole milliseconds, few decimals, the reader's w of the orientation."""
-    t = (start_ms + np.round(1000 * imu.t)) / 1000
-    columns = {
-        "acceleration": imu.acceleration,
-        "rotation_rate": imu.rotation_rate,
-        "magnetic_field": imu.magnetic_field,
-        "orientation": imu.orientation[:, 1:],
-    }
-    written = {name: np.round(values, DECIMALS[name]) for name, values in columns.items()}
-    x, y, z = written["orientation"].T
-    w = np.sqrt(np.maximum(0.0, 1 - x * x - y * y - z * z))
-    written["orientation"] = np.column_stack([w, x, y, z])
-    return {name: Series(t, values) for name, values in written.items()}
 
 
 def _wifi(sweep: Sweep, radios: RadioField, start_ms: int) -> WifiScan:

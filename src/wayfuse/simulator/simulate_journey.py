@@ -6,19 +6,20 @@ knows. The app's clock starts with the recording; places are stated in degrees a
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from wayfuse.core.angles import wrap
 from wayfuse.core.frames import GeoAnchor
 from wayfuse.core.types import Array, IntArray
-from wayfuse.sensors.recording import Device, Recording, Series
+from wayfuse.sensors.recording import Device, Recording
 from wayfuse.sensors.records import Waypoint, WifiScan
-from wayfuse.simulator.barometer import PressureSamples, measure_pressure
-from wayfuse.simulator.imu import ImuSamples, measure
+from wayfuse.simulator.barometer import measure_pressure
+from wayfuse.simulator.imu import measure
 from wayfuse.simulator.journeys import Journey, Trip, draw_trips, plan_journey, stay
 from wayfuse.simulator.passages import Activity
+from wayfuse.simulator.phone_columns import sensed
 from wayfuse.simulator.radio_field import RadioField
 from wayfuse.simulator.scanner import Sweep, scan
 from wayfuse.simulator.scenario import Scenario
@@ -27,7 +28,16 @@ from wayfuse.simulator.storeys import three_storeys
 from wayfuse.simulator.travel import travel
 from wayfuse.simulator.walker import Person, Walk, draw_person
 
-__all__ = ["DECIMALS", "JourneyTruth", "Phone", "make_house", "simulate_journey", "simulate_stay"]
+__all__ = [
+    "DECIMALS",
+    "JourneyTruth",
+    "Phone",
+    "go",
+    "make_house",
+    "record",
+    "simulate_journey",
+    "simulate_stay",
+]
 
 DECIMALS = {
     "acceleration": 5,
@@ -118,7 +128,9 @@ def simulate_journey(
         pause_share=scenario.pause_share,
         pause_range=scenario.pause_s,
     )
-    return _record(site, scenario, rng, name, journey, draw_person(scenario.walker, rng), phone or Phone())
+    person = draw_person(scenario.walker, rng)
+    w = go(site, scenario, rng, journey, person)
+    return record(site, scenario, rng, name, w, person, phone or Phone())
 
 
 def simulate_stay(
@@ -133,47 +145,47 @@ def simulate_stay(
 ) -> tuple[Recording, JourneyTruth]:
     """Simulate one walk on a floor: a surveyor's, with ``visits`` (e,) how often each corridor was walked, updated."""
     person = draw_person(scenario.walker, rng)
-    length = (
-        rng.uniform(*scenario.duration_s) * person.step_rate * person.step_length * 0.85
-    )  # stops, first steps
     journey = stay(
         site.building,
         floor,
-        length,
+        scenario.way_length(person, rng),
         rng,
         wander=scenario.wander_m,
         pause_share=scenario.pause_share,
         pause_range=scenario.pause_s,
         visits=visits,
     )
-    return _record(site, scenario, rng, name, journey, person, phone or Phone())
+    w = go(site, scenario, rng, journey, person)
+    return record(site, scenario, rng, name, w, person, phone or Phone())
 
 
-def _record(
+def go(
+    site: SimulatedSite, scenario: Scenario, rng: np.random.Generator, journey: Journey, person: Person
+) -> Walk:
+    """A person on a journey: what happens, before any sensor."""
+    elevations = np.array([storey.elevation for storey in site.building.storeys])
+    return travel(journey.start, journey.legs, elevations, person, scenario.walker, scenario.lift, rng)
+
+
+def record(
     site: SimulatedSite,
     scenario: Scenario,
     rng: np.random.Generator,
     name: str,
-    journey: Journey,
+    w: Walk,
     person: Person,
     phone: Phone,
 ) -> tuple[Recording, JourneyTruth]:
-    elevations = np.array([storey.elevation for storey in site.building.storeys])
-    w = travel(journey.start, journey.legs, elevations, person, scenario.walker, scenario.lift, rng)
+    """What a phone records of a walk that `go` made, and the truth."""
     if w.climb is None:
         raise AssertionError("a journey has heights")
     imu = measure(w, 0, person, site.magnetic, scenario.imu, scenario.walker, rng)
     air = measure_pressure(w, scenario.barometer, phone.pressure_hpa, rng)
     sweeps = scan(w, 0, site.radios, scenario.scanner, rng, _cabin_loss(site, w, scenario))
-    series = _series(imu, air)
+    base = sensed(name, imu, np.round(imu.t, DECIMALS["time"]), DECIMALS, air)
     stated = w.stated + np.array([0.0, 1.0, 1.0]) * rng.normal(0.0, scenario.stated_sigma, w.stated.shape)
-    recording = Recording(
-        name=name,
-        acceleration=series["acceleration"],
-        rotation_rate=series["rotation_rate"],
-        magnetic_field=series["magnetic_field"],
-        pressure=series["pressure"],
-        orientation=series["orientation"],
+    recording = replace(
+        base,
         wifi=_scans(sweeps, site.radios),
         waypoints=_stated(stated, w.climb.stated_floor, site),
         clock="AppTimestamp",
@@ -209,23 +221,6 @@ def _cabin_loss(site: SimulatedSite, w: Walk, scenario: Scenario) -> Array:
     lifts = [k for k, passage in enumerate(site.building.passages) if passage.is_lift]
     inside = np.isin(climb.passage, lifts) & (climb.activity != Activity.WALKING)
     return np.asarray(inside[:, None] * np.array(scenario.lift.loss_db))
-
-
-def _series(imu: ImuSamples, air: PressureSamples) -> dict[str, Series]:
-    """Columns as the file has them: few decimals, the reader's w of the orientation."""
-    columns = {
-        "acceleration": imu.acceleration,
-        "rotation_rate": imu.rotation_rate,
-        "magnetic_field": imu.magnetic_field,
-        "orientation": imu.orientation[:, 1:],
-        "pressure": air.hpa[:, None],
-    }
-    written = {name: np.round(values, DECIMALS[name]) for name, values in columns.items()}
-    x, y, z = written["orientation"].T
-    w = np.sqrt(np.maximum(0.0, 1 - x * x - y * y - z * z))
-    written["orientation"] = np.column_stack([w, x, y, z])
-    t = {name: np.round(air.t if name == "pressure" else imu.t, DECIMALS["time"]) for name in written}
-    return {name: Series(t[name], values) for name, values in written.items()}
 
 
 def _scans(sweeps: tuple[Sweep, ...], radios: RadioField) -> tuple[WifiScan, ...]:

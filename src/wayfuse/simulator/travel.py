@@ -6,7 +6,7 @@ number is the plan's. A rider stands while the lift or escalator moves. Heights 
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -14,7 +14,16 @@ import numpy as np
 from wayfuse.core.types import Array, IntArray
 from wayfuse.simulator.passages import Activity, Stretch
 from wayfuse.simulator.rides import LiftModel, ride
-from wayfuse.simulator.walker import GRID_HZ, Climb, Person, Walk, WalkerModel, smooth, steps_between
+from wayfuse.simulator.walker import (
+    GRID_HZ,
+    Climb,
+    Person,
+    Walk,
+    WalkerModel,
+    path_on_grid,
+    smooth,
+    steps_between,
+)
 
 __all__ = ["Leg", "travel"]
 
@@ -75,7 +84,11 @@ def travel(
         _go(log, legs, k, last, vertex, direction, person, model, lifts, rng)
         k = last + 1
     log.t += float(rng.uniform(*model.lead_out))
-    return _path(log, xy, vertex, direction, elevations, model)
+    stated_t = np.array([row[0] for row in log.stated])
+    stated_floor = np.array([row[1] for row in log.stated], dtype=np.int64)
+    events = np.array(log.knots), np.array(log.contacts), log.bouts, stated_t
+    level = path_on_grid(xy, vertex, direction, *events, log.t, model)
+    return replace(level, climb=_climbed(log, level.t, elevations, stated_floor))
 
 
 def _directions(xy: Array) -> Array:
@@ -175,35 +188,6 @@ def _carry(log: _Log, flight: Stretch, run: float, lifts: LiftModel) -> None:
     log.arc += run
     log.knots.append((log.t, log.arc, log.knots[-1][2]))
     log.heights.append((log.t, height + flight.rise))
-
-
-def _path(
-    log: _Log, xy: Array, vertex: Array, direction: Array, elevations: Array, model: WalkerModel
-) -> Walk:
-    """The rounded path and its heights on a regular grid of times."""
-    knots, contacts = np.array(log.knots), np.array(log.contacts)
-    grid = np.arange(0.0, log.t + 1e-9, 1.0 / GRID_HZ)
-    arc = np.interp(grid, knots[:, 0], knots[:, 1])
-    straight = np.column_stack([np.interp(arc, vertex, xy[:, k]) for k in (0, 1)])
-    place = smooth(straight, model.path_window)
-    segment = np.clip(np.searchsorted(vertex, arc, side="right") - 1, 0, len(direction) - 1)
-    walking = np.searchsorted(np.array(log.bouts), grid, side="right") % 2
-    t, floors = (
-        np.array([row[0] for row in log.stated]),
-        np.array([row[1] for row in log.stated], dtype=np.int64),
-    )
-    return Walk(
-        t=grid,
-        xy=place,
-        heading=smooth(direction[segment], model.turn_window),
-        gait=smooth(walking.astype(np.float64), 0.3),
-        contact=contacts[:, 0],
-        step_length=contacts[:, 1],
-        phase_t=knots[:, 0],
-        phase=knots[:, 2],
-        stated=np.column_stack([t, *[np.interp(t, grid, place[:, k]) for k in (0, 1)]]),
-        climb=_climbed(log, grid, elevations, floors),
-    )
 
 
 def _climbed(log: _Log, grid: Array, elevations: Array, stated_floor: IntArray) -> Climb:

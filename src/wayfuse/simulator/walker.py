@@ -23,6 +23,7 @@ __all__ = [
     "Walk",
     "WalkerModel",
     "draw_person",
+    "path_on_grid",
     "smooth",
     "steps_between",
     "walk",
@@ -139,7 +140,8 @@ def walk(route: Route, person: Person, model: WalkerModel, rng: np.random.Genera
             t += float(route.pause[b])
             stated.append(t)  # and leaving where one stood
     t += float(rng.uniform(*model.lead_out))
-    return _path(route, vertex, direction, np.array(knots), np.array(contacts), bouts, stated, t, model)
+    events = np.array(knots), np.array(contacts), bouts, np.array(stated)
+    return path_on_grid(route.xy, vertex, direction, *events, t, model)
 
 
 def steps_between(
@@ -170,35 +172,42 @@ def steps_between(
     return steps
 
 
-def _path(
-    route: Route,
+def path_on_grid(
+    xy: Array,
     vertex: Array,
     direction: Array,
     knots: Array,
     contacts: Array,
     bouts: list[float],
-    stated: list[float],
+    stated: Array,
     duration: float,
     model: WalkerModel,
 ) -> Walk:
-    """The rounded path on a regular grid of times."""
+    """The rounded path on a regular grid of times.
+
+    Parameters
+    ----------
+    xy : (k, 2) m, corners of the way. vertex : (k,) m, their arc lengths. direction : (k - 1,) rad, unwrapped.
+    knots : (n, 3) times (s), arc lengths (m) and gait phases. contacts : (s, 2) times and lengths of the steps.
+    bouts : s, start, end, start ... of walking. stated : (w,) s, when the surveyor states a place.
+    """
     grid = np.arange(0.0, duration + 1e-9, 1.0 / GRID_HZ)
     arc = np.interp(grid, knots[:, 0], knots[:, 1])
-    straight = np.column_stack([np.interp(arc, vertex, route.xy[:, k]) for k in (0, 1)])
-    xy = smooth(straight, model.path_window)
+    straight = np.column_stack([np.interp(arc, vertex, xy[:, k]) for k in (0, 1)])
+    place = smooth(straight, model.path_window)
     segment = np.clip(np.searchsorted(vertex, arc, side="right") - 1, 0, len(direction) - 1)
     walking = np.searchsorted(np.array(bouts), grid, side="right") % 2
-    place = np.column_stack([np.interp(stated, grid, xy[:, k]) for k in (0, 1)])
+    steps = contacts.reshape(-1, 2)  # nobody steps on a journey by lift alone
     return Walk(
         t=grid,
-        xy=xy,
+        xy=place,
         heading=smooth(direction[segment], model.turn_window),
         gait=smooth(walking.astype(np.float64), 0.3),
-        contact=contacts[:, 0],
-        step_length=contacts[:, 1],
+        contact=steps[:, 0],
+        step_length=steps[:, 1],
         phase_t=knots[:, 0],
         phase=knots[:, 2],
-        stated=np.column_stack([stated, place]),
+        stated=np.column_stack([stated, *[np.interp(stated, grid, place[:, k]) for k in (0, 1)]]),
     )
 
 
