@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -10,10 +11,17 @@ from wayfuse.core.errors import UsageError
 from wayfuse.inertial.front_end import StepEvent
 from wayfuse.inertial.vertical import VerticalEvent
 from wayfuse.radio.survey import Fingerprint
+from wayfuse.sensors.records import Range
 from wayfuse.tracking.engine import Known, Why
 from wayfuse.tracking.estimate import Estimate, State
 
 __all__ = ["DeadReckoning", "DeadReckoningState", "Start"]
+
+
+_R95 = 1.73  # 95 % of a circular normal law lie within this many sigma
+_FAST_WALK = (
+    1.8  # m/s; few people walk faster indoors, so a silence of t seconds hides at most about this times t
+)
 
 
 class Start(NamedTuple):
@@ -25,12 +33,13 @@ class Start(NamedTuple):
 
 
 class DeadReckoningState(NamedTuple):
-    """Position (m), distance walked since the start (m), and steps since the last estimate."""
+    """Position (m), distance walked since the start (m), steps since the last estimate; m gone unheard, if at all."""
 
     x: float
     y: float
     walked: float = 0.0
     why: Why = Why()
+    unheard: float = 0.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -46,6 +55,7 @@ class DeadReckoning:
     rotation: float = 0.0
     heading_error: float = 0.2
     uses_steps: bool = True
+    uses_ranges: bool = False
     uses_scans: bool = False
     supports_lag: bool = False
     uses_vertical: bool = False
@@ -54,12 +64,16 @@ class DeadReckoning:
         """State at the start."""
         return DeadReckoningState(self.start.x, self.start.y)
 
+    def resume(self, state: DeadReckoningState, track: str, seed: int, silence: float) -> DeadReckoningState:
+        """On from the last place, lost: r95 reaches as far as a person can have walked meanwhile."""
+        return state._replace(unheard=state.unheard + _FAST_WALK * silence, why=Why())
+
     def on_step(self, state: DeadReckoningState, event: StepEvent) -> DeadReckoningState:
         """One step on."""
         heading = event.heading - self.rotation
         why = state.why._replace(n_steps=state.why.n_steps + 1)
         x, y = state.x + event.length * math.cos(heading), state.y + event.length * math.sin(heading)
-        return DeadReckoningState(x, y, state.walked + event.length, why)
+        return state._replace(x=x, y=y, walked=state.walked + event.length, why=why)
 
     def on_vertical(self, state: DeadReckoningState, event: VerticalEvent) -> DeadReckoningState:
         """Stairs and lifts do not move it."""
@@ -79,9 +93,15 @@ class DeadReckoning:
         """The radio is not used."""
         return state
 
+    def on_ranges(
+        self, state: DeadReckoningState, t: float, ranges: Sequence[Range], known: Known
+    ) -> DeadReckoningState:
+        """Ranges are not used."""
+        return state
+
     def estimate(self, state: DeadReckoningState, t: float) -> tuple[DeadReckoningState, Estimate]:
         """The sum of the steps; radii grow with the distance walked."""
-        sigma = 1.0 + self.heading_error * state.walked
+        sigma = 1.0 + self.heading_error * state.walked + state.unheard / _R95
         e = Estimate(
             t,
             state.x,
@@ -91,8 +111,8 @@ class DeadReckoning:
             0.0,
             sigma**2 / 2,
             1.07 * sigma,
-            1.73 * sigma,
-            State.TRACKING,
+            _R95 * sigma,
+            State.LOST if state.unheard else State.TRACKING,
             state.why.n_steps,
         )
         return state._replace(why=Why()), e

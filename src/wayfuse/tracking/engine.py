@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple, Protocol, TypeVar
 
+from wayfuse.core.types import Array
+from wayfuse.filters.cloud import Cloud
 from wayfuse.inertial.front_end import StepEvent
 from wayfuse.inertial.vertical import VerticalEvent
 from wayfuse.radio.survey import Fingerprint
+from wayfuse.sensors.records import Range
 from wayfuse.tracking.estimate import Estimate, State
 
-__all__ = ["Engine", "Known", "Why", "unknown"]
+__all__ = ["Engine", "Known", "RangeObservation", "Why", "unknown"]
 
 S = TypeVar("S")
 
@@ -32,11 +36,20 @@ class Known(NamedTuple):
     height: bool = False
 
 
+class RangeObservation(Protocol):
+    """How likely ranges of one moment are at each particle."""
+
+    def log_likelihood(self, cloud: Cloud, ranges: Sequence[Range], out: Array, /) -> bool:
+        """Add to ``out`` (N,); False, and nothing added, where they say nothing."""
+        ...
+
+
 class Engine(Protocol[S]):
     """A positioning method as pure functions of its own state ``S``.
 
     ``uses_steps`` tells whether it moves on steps (else it diffuses with time); ``uses_scans`` whether it looks at
-    scans; ``supports_lag`` whether it can say later where it was; ``uses_vertical`` whether stairs and lifts move it.
+    scans, ``uses_ranges`` at ranges; ``supports_lag`` whether it can say later where it was; ``uses_vertical`` whether
+    stairs and lifts move it.
     """
 
     @property
@@ -50,12 +63,24 @@ class Engine(Protocol[S]):
         ...
 
     @property
+    def uses_ranges(self) -> bool:
+        """Whether ranges change it."""
+        ...
+
+    @property
     def supports_lag(self) -> bool:
         """Whether `mark` and `recall` work."""
         ...
 
     def init(self, track: str, seed: int) -> S:
         """State before the first record."""
+        ...
+
+    def resume(self, state: S, track: str, seed: int, silence: float) -> S:
+        """State after ``silence`` seconds in which the person can have gone anywhere; ``track`` is a name of its own.
+
+        A start that was told once says nothing any more: what cannot be found again is `State.LOST`.
+        """
         ...
 
     @property
@@ -77,6 +102,10 @@ class Engine(Protocol[S]):
 
     def on_fingerprint(self, state: S, t: float, fingerprint: Fingerprint, known: Known) -> S:
         """A scan was delivered."""
+        ...
+
+    def on_ranges(self, state: S, t: float, ranges: Sequence[Range], known: Known) -> S:
+        """Ranges of one moment came in; only asked where ``uses_ranges``."""
         ...
 
     def estimate(self, state: S, t: float) -> tuple[S, Estimate]:

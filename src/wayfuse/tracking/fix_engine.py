@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -13,6 +14,7 @@ from wayfuse.inertial.vertical import VerticalEvent
 from wayfuse.radio.device_offset import DeviceOffset, OffsetState, shifted
 from wayfuse.radio.sparse_knn import SparseKnn, fix_of
 from wayfuse.radio.survey import Fingerprint
+from wayfuse.sensors.records import Range
 from wayfuse.tracking.engine import Known, Why, unknown
 from wayfuse.tracking.estimate import Estimate, State
 
@@ -44,6 +46,7 @@ class FixEngine:
     radius_95: tuple[float, float] = (6.0, 45.0)
     device: DeviceOffset | None = None
     uses_steps: bool = True  # steps are counted, nothing else
+    uses_ranges: bool = False
     uses_scans: bool = True
     supports_lag: bool = False
     uses_vertical: bool = False
@@ -51,6 +54,10 @@ class FixEngine:
     def init(self, track: str, seed: int) -> FixState:
         """State before the first record."""
         return FixState(offset=None if self.device is None else self.device.init())
+
+    def resume(self, state: FixState, track: str, seed: int, silence: float) -> FixState:
+        """State after a long silence: as before the first record."""
+        return self.init(track, seed)
 
     def on_step(self, state: FixState, event: StepEvent) -> FixState:
         """Steps do not move a fix."""
@@ -88,6 +95,10 @@ class FixEngine:
         xx, xy, yy = (float(np.sum(w * a * b)) for a, b in ((dx, dx), (dx, dy), (dy, dy)))
         said = Estimate(t, fix.x, fix.y, fix.floor, xx, xy, yy, r68, r95, State.TRACKING)
         return FixState(said, Why(n_aps=near.n_aps), offset)
+
+    def on_ranges(self, state: FixState, t: float, ranges: Sequence[Range], known: Known) -> FixState:
+        """Ranges are not used."""
+        return state
 
     def estimate(self, state: FixState, t: float) -> tuple[FixState, Estimate]:
         """The last fix."""

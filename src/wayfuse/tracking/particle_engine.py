@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -26,8 +27,10 @@ from wayfuse.radio.device_offset import OffsetState
 from wayfuse.radio.sparse_knn import Neighbours
 from wayfuse.radio.standing import Standing
 from wayfuse.radio.survey import Fingerprint
-from wayfuse.tracking.engine import Known, Why, unknown
+from wayfuse.sensors.records import Range
+from wayfuse.tracking.engine import Known, RangeObservation, Why, unknown
 from wayfuse.tracking.estimate import Estimate, State
+from wayfuse.tracking.fixed_lag import recalled, remembered
 from wayfuse.tracking.floor_change import FloorChange, Movement
 from wayfuse.tracking.radio_parts import Radio
 from wayfuse.tracking.summary import Held, Summary, on_walkable, summarise
@@ -110,11 +113,12 @@ class ParticleEngine:
 
     Parameters
     ----------
-    n_floors : of the site. radio : what answers scans, None = Wi-Fi is not used. start : where the track starts, None =
-    at the first scan; one of the two is needed. prior : the estimate before. motion, constraint : of steps; constraint
-    None = no map. diffusion : motion while no motion sensor speaks. floor_change : takes the cloud over stairs and
-    lifts, None = floors change by scans only. walkable : mask per floor that estimates are kept on, empty = none.
-    uses_steps : False = diffusion always. rotation : rad, heading of building +x from east (headings arrive
+    n_floors : of the site. radio : what answers scans, None = Wi-Fi is not used. ranging : what answers ranges of known
+    anchors, None = they are not used; they refine a track that a scan or a start began. start : where the track starts,
+    None = at the first scan; one of the two is needed. prior : the estimate before. motion, constraint : of steps;
+    constraint None = no map. diffusion : motion while no motion sensor speaks. floor_change : takes the cloud over
+    stairs and lifts, None = floors change by scans only. walkable : mask per floor that estimates are kept on, empty =
+    none. uses_steps : False = diffusion always. rotation : rad, heading of building +x from east (headings arrive
     counter-clockwise from east).
     """
 
@@ -123,6 +127,7 @@ class ParticleEngine:
     motion: PdrMotion
     diffusion: RandomWalk
     radio: Radio | None = None
+    ranging: RangeObservation | None = None
     start: KnownStart | None = None
     constraint: Constraint | None = None
     filter: ParticleFilter = field(default_factory=ParticleFilter)
@@ -149,19 +154,29 @@ class ParticleEngine:
 
     def init(self, track: str, seed: int) -> ParticleState:
         """State before the first record."""
-        key = track_key(seed, track)
-        device = None if self.radio is None else self.radio.device
-        state = ParticleState(key, offset=None if device is None else device.init())
+        state = self._unplaced(track, seed)
         if self.start is None:
             return state
-        noise = Noise(key)
+        noise = Noise(state.key)
         cloud = self.start.draw(noise, self.n_particles)
         return state._replace(filter=FilterState(cloud, np.zeros(self.n_particles), noise.draw))
+
+    def resume(self, state: ParticleState, track: str, seed: int, silence: float) -> ParticleState:
+        """State after a long silence: somewhere in the building until a scan; without Wi-Fi lost from here on.
+
+        The floor plan alone could gather the particles again, but at any of the places that look alike.
+        """
+        return self._unplaced(track, seed)
 
     @property
     def uses_scans(self) -> bool:
         """Whether scans change it."""
         return self.radio is not None
+
+    @property
+    def uses_ranges(self) -> bool:
+        """Whether ranges change it."""
+        return self.ranging is not None
 
     @property
     def uses_vertical(self) -> bool:
@@ -221,6 +236,21 @@ class ParticleEngine:
         state = self._weigh(state, state.filter, self.radio, near, known, spacing)
         return state._replace(scanned=t)
 
+    def on_ranges(
+        self, state: ParticleState, t: float, ranges: Sequence[Range], known: Known
+    ) -> ParticleState:
+        """Weigh by the ranges of one moment; those of unknown anchors change nothing."""
+        log_likelihood = np.zeros(self.n_particles)
+        if (
+            self.ranging is None
+            or state.filter is None
+            or not self.ranging.log_likelihood(state.filter.cloud, ranges, log_likelihood)
+        ):
+            return state
+        after, info = self.filter.update(state.key, state.filter, log_likelihood)
+        why = state.why._replace(n_aps=max(state.why.n_aps, len(ranges)))
+        return state._replace(filter=after, why=why, ess=info.ess / self.n_particles)
+
     def _weigh(
         self,
         state: ParticleState,
@@ -251,28 +281,31 @@ class ParticleEngine:
     def estimate(self, state: ParticleState, t: float) -> tuple[ParticleState, Estimate]:
         """Geometric median on the heaviest floor, with radii."""
         if state.filter is None:
-            return self._explained(state, unknown(t, self.prior))
+            return self._explained(state, self._nowhere(t))
         cloud = state.filter.cloud
         return self._say(state, t, Snapshot(t, cloud.x, cloud.y, cloud.floor))
 
     def mark(self, state: ParticleState, t: float) -> ParticleState:
         """Keep where the particles are, so that their descendants can say where they came from."""
-        if state.filter is None:
-            return state._replace(marks=(*state.marks, t))
-        cloud = state.filter.cloud
-        history = (*state.filter.history, Snapshot(t, cloud.x, cloud.y, cloud.floor))
-        return state._replace(filter=state.filter._replace(history=history), marks=(*state.marks, t))
+        return state._replace(filter=remembered(state.filter, t), marks=(*state.marks, t))
 
     def recall(self, state: ParticleState) -> tuple[ParticleState, Estimate]:
         """Where the ancestors of today's particles were at the oldest mark, weighted by what is known today."""
-        t, n_marks = state.marks[0], len(state.marks)
-        state = state._replace(marks=state.marks[1:])
-        # marks of the time before the first usable scan have no snapshot
-        if state.filter is None or len(state.filter.history) < n_marks:
-            return self._explained(state, unknown(t, self.prior))
-        past = state.filter.history[0]
-        state = state._replace(filter=state.filter._replace(history=state.filter.history[1:]))
+        t = state.marks[0]
+        now, past = recalled(state.filter, len(state.marks))
+        state = state._replace(filter=now, marks=state.marks[1:])
+        if past is None:  # of the time before the first usable scan
+            return self._explained(state, self._nowhere(t))
         return self._say(state, t, past)
+
+    def _unplaced(self, track: str, seed: int) -> ParticleState:
+        device = None if self.radio is None else self.radio.device
+        return ParticleState(track_key(seed, track), offset=None if device is None else device.init())
+
+    def _nowhere(self, t: float) -> Estimate:
+        """Without particles: nothing but the building is known; who is not found by scans had a start, and lost it."""
+        said = unknown(t, self.prior)
+        return said if self.radio is not None else said._replace(state=State.LOST)
 
     def _moved(self, state: ParticleState, after: FilterState, n_blocked: int, why: Why) -> ParticleState:
         if n_blocked:  # penalties add up: without a scan for long all weight would end on a few particles

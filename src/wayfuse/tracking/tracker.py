@@ -31,6 +31,7 @@ from wayfuse.sensors.records import (
     MagneticField,
     Orientation,
     Pressure,
+    Range,
     Record,
     RotationRate,
     Waypoint,
@@ -46,6 +47,7 @@ S = TypeVar("S")
 _MOTION = (Acceleration, RotationRate, MagneticField, Orientation, Pressure)
 _QUIET_AFTER = 2.0  # s without motion sensors until a method diffuses (a standing phone still reports)
 _LONGEST_GAP = 300.0  # s; after a longer silence the track starts anew: the person can be anywhere
+_LONGEST_RANGE = 1e3  # m; no radio ranges further indoors
 _FAR = 1e12  # s; times beyond are no times: float64 no longer tells milliseconds apart
 
 
@@ -64,6 +66,7 @@ class TrackState(NamedTuple, Generic[S]):
     last_motion: float = -np.inf
     diffused: float = -np.inf
     pending: tuple[float, ...] = ()
+    ranges: tuple[Range, ...] = ()  # of the present moment, which may not be over
 
 
 class _Replay(NamedTuple):
@@ -132,7 +135,9 @@ class Tracker(Generic[S]):
         if record.t < state.now:
             return state, [], Verdict.LATE
         out: list[Estimate] = []
-        is_heard = isinstance(record, Acceleration | WifiScan)
+        if state.ranges and record.t > state.ranges[0].t:
+            state = self._ranges(state, out)
+        is_heard = isinstance(record, Acceleration | WifiScan | Range)
         is_paused = state.now > -np.inf and record.t - state.now > _LONGEST_GAP
         if is_paused or (is_heard and record.t - state.last_heard > _LONGEST_GAP):
             state = self._restart(state, record.t, out)
@@ -142,8 +147,11 @@ class Tracker(Generic[S]):
         if isinstance(record, WifiScan):
             state, verdict = self._scan(state, record, out)
             return state, out, verdict
+        if isinstance(record, Range):
+            state, verdict = self._range(state, record)
+            return state, out, verdict
         if not isinstance(record, _MOTION):
-            return state, out, Verdict.IGNORED  # ranges, BLE: no model yet
+            return state, out, Verdict.IGNORED  # BLE, channel state: no model yet
         front_end, event = self.front_end.step(state.front_end, record)
         state = state._replace(front_end=front_end)
         if isinstance(record, Acceleration):
@@ -170,7 +178,7 @@ class Tracker(Generic[S]):
     def flush(self, state: TrackState[S], until: float) -> tuple[TrackState[S], list[Estimate]]:
         """The estimates still due up to a time, and those that wait for their lag."""
         out: list[Estimate] = []
-        state = self._finish(state, until, out, None)
+        state = self._finish(self._ranges(state, out), until, out, None)
         return state, out
 
     def run(self, recording: Recording, seed: int = 0) -> Track:
@@ -181,7 +189,8 @@ class Tracker(Generic[S]):
         verdicts: Counter[Verdict] = Counter()
         if recording.is_empty:
             return Track(recording.name, out, verdicts)
-        if _has_breaks(recording):
+        # ranges are few; the array path is for what is many
+        if (recording.ranges and self.engine.uses_ranges) or _has_breaks(recording):
             return self._run_by_record(recording, state)
         start, end = recording.span
         replay = _Replay(recording.acceleration.t)
@@ -261,9 +270,17 @@ class Tracker(Generic[S]):
     def _restart(self, state: TrackState[S], t: float, out: list[Estimate]) -> TrackState[S]:
         """After a long silence the person can be anywhere: finish what was, begin anew under a name of its own."""
         state = self._finish(state, state.now, out, None)
+        silence = t - min(state.now, state.last_heard)
         fresh = self.init(f"{state.name}@{t:.3f}", state.seed)
+        engine = self.engine.resume(state.engine, fresh.name, fresh.seed, silence)
         return fresh._replace(
-            front_end=state.front_end, vertical=state.vertical, now=t, next_output=t, diffused=t, last_heard=t
+            engine=engine,
+            front_end=state.front_end,
+            vertical=state.vertical,
+            now=t,
+            next_output=t,
+            diffused=t,
+            last_heard=t,
         )
 
     @staticmethod
@@ -306,11 +323,8 @@ class Tracker(Generic[S]):
         repeated = scans is state.scans
         state = self._diffuse(state._replace(scans=scans), scan.t)
         if fingerprint is not None:
-            known = Known(
-                state.front_end.is_heading_absolute, math.isfinite(self.vertical.altitude(state.vertical))
-            )
             before = state.engine
-            engine = self.engine.on_fingerprint(before, scan.t, fingerprint, known)
+            engine = self.engine.on_fingerprint(before, scan.t, fingerprint, self._known(state))
             state = state._replace(engine=engine)
             verdict = Verdict.USED if engine is not before else Verdict.UNKNOWN_ACCESS_POINTS
             if not self.engine.uses_scans:
@@ -318,6 +332,32 @@ class Tracker(Generic[S]):
         else:
             verdict = Verdict.DUPLICATE if repeated else Verdict.OUT_OF_RANGE
         return self._output(state, scan.t, out), verdict
+
+    def _range(self, state: TrackState[S], record: Range) -> tuple[TrackState[S], Verdict]:
+        """Keep a range until its moment is over: those of one time are looked at together."""
+        if not self.engine.uses_ranges:
+            return state, Verdict.IGNORED
+        if not math.isfinite(record.distance):
+            return state, Verdict.NOT_FINITE
+        if abs(record.distance) > _LONGEST_RANGE:
+            return state, Verdict.OUT_OF_RANGE
+        if any(other.anchor == record.anchor for other in state.ranges):
+            return state, Verdict.DUPLICATE
+        return state._replace(ranges=(*state.ranges, record)), Verdict.USED
+
+    def _ranges(self, state: TrackState[S], out: list[Estimate]) -> TrackState[S]:
+        """Look at the ranges of a moment that is over."""
+        if not state.ranges:
+            return state
+        ranges, t = state.ranges, state.ranges[0].t
+        state = self._diffuse(state._replace(ranges=()), t)
+        engine = self.engine.on_ranges(state.engine, t, ranges, self._known(state))
+        return self._output(state._replace(engine=engine), t, out)
+
+    def _known(self, state: TrackState[S]) -> Known:
+        return Known(
+            state.front_end.is_heading_absolute, math.isfinite(self.vertical.altitude(state.vertical))
+        )
 
     def _diffuse(self, state: TrackState[S], t: float) -> TrackState[S]:
         spoke = state.last_motion if self.engine.uses_steps else -np.inf
