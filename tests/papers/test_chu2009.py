@@ -1,4 +1,4 @@
-"""chu2009: the RIM model, the map, the disc, and a reduced run of the experiments."""
+"""chu2009: the RIM model, the disc, and a reduced run of the experiments."""
 
 from __future__ import annotations
 
@@ -11,7 +11,6 @@ from wayfuse.evaluation.results_folds import in_turn
 from wayfuse.filters.cloud import Cloud
 from wayfuse.models.motion.displaced_disc import DisplacedDisc
 from wayfuse.papers import chu2009
-from wayfuse.presets.chu2009 import GridMap
 from wayfuse.simulator.chu2009_world import FieldModel, draw_field, room_walls, walk
 from wayfuse.simulator.geometry import crossings
 
@@ -41,15 +40,6 @@ def test_the_walk_passes_no_wall_and_keeps_its_pace() -> None:
     pace = np.hypot(*walked.moved[1:].T)
     assert np.all(pace <= 1.0 + 1e-9)
     assert np.median(pace) == pytest.approx(1.0)
-
-
-def test_the_map_is_bilinear_between_its_places_and_finds_them() -> None:
-    rng = np.random.default_rng(4)
-    grid = GridMap(rng.normal(-60.0, 5.0, (5, 5, 3)), 2.0)
-    np.testing.assert_allclose(grid.at(np.array([4.0]), np.array([6.0]))[0], grid.levels[3, 2])
-    middle = grid.levels[1:3, 2:4].mean(axis=(0, 1))
-    np.testing.assert_allclose(grid.at(np.array([5.0]), np.array([3.0]))[0], middle)
-    np.testing.assert_array_equal(grid.nearest(grid.levels[4, 1]), [2.0, 8.0])
 
 
 def test_the_disc_is_uniform_in_radius_and_stays_in_the_field() -> None:

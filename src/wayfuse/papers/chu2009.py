@@ -13,7 +13,8 @@ from wayfuse.evaluation.results_bars import Bar, at_most, within
 from wayfuse.evaluation.results_folds import Mapper
 from wayfuse.maps.walls import WallIndex
 from wayfuse.papers.reproduction import Interval, Reproduction, Table, mean_interval
-from wayfuse.presets.chu2009 import Config, GridMap, nnss, pf_mcl, pfmm
+from wayfuse.presets.chu2009 import Config, nnss, pf_mcl, pfmm
+from wayfuse.radio.level_grid import LevelGrid
 from wayfuse.simulator.chu2009_world import FieldModel, draw_field, room_walls, walk
 
 __all__ = ["SEEDS", "Experiment", "reproduce"]
@@ -71,7 +72,7 @@ class Experiment:
         rng = np.random.default_rng([2009, seed])
         field = draw_field(model, rng)
         walked = walk(field, rng)
-        grid = GridMap(field.levels, model.grain)
+        grid = LevelGrid(field.levels, model.grain)
         config = Config(kernel_sigma=max(model.noise, 1.0))
         free = replace(config, r_max=_FAST_R_MAX if model.speed > 1.0 else config.r_max)
         moved = _sensed(walked.moved, condition, rng)

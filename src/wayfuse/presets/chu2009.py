@@ -6,11 +6,10 @@ Chu, Wireless location tracking by a sensor-enhanced particle filter in 2.5D bui
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wayfuse.core.philox import Noise, track_key
 from wayfuse.core.types import Array
@@ -20,8 +19,9 @@ from wayfuse.filters.widening import WideningFilter, scaling
 from wayfuse.maps.walls import WallIndex
 from wayfuse.models.constraint.barriers import Barriers
 from wayfuse.models.motion.displaced_disc import DisplacedDisc
+from wayfuse.radio.level_grid import LevelGrid
 
-__all__ = ["Config", "GridMap", "nnss", "pf_mcl", "pfmm"]
+__all__ = ["Config", "nnss", "pf_mcl", "pfmm"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -36,53 +36,23 @@ class Config:
     rounds: int = 6  # of widening where all are filtered; the thesis widens without end
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class GridMap:
-    """Training places on a square grid from 0: levels (ny, nx, a) dBm every ``grain`` m."""
-
-    levels: Array
-    grain: float
-    _flat: Array = field(init=False, repr=False)
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "_flat", self.levels.reshape(-1, self.levels.shape[-1]))
-
-    def at(self, x: NDArray[np.floating], y: NDArray[np.floating]) -> Array:
-        """Levels (n, a) dBm by bilinear interpolation of the training places."""
-        ny, nx, _ = self.levels.shape
-        gx = np.clip(np.asarray(x, dtype=np.float64) / self.grain, 0.0, nx - 1.0)
-        gy = np.clip(np.asarray(y, dtype=np.float64) / self.grain, 0.0, ny - 1.0)
-        i = np.minimum(gx.astype(int), nx - 2)
-        j = np.minimum(gy.astype(int), ny - 2)
-        fx, fy = (gx - i)[:, None], (gy - j)[:, None]
-        low = (1.0 - fx) * self.levels[j, i] + fx * self.levels[j, i + 1]
-        high = (1.0 - fx) * self.levels[j + 1, i] + fx * self.levels[j + 1, i + 1]
-        return np.asarray((1.0 - fy) * low + fy * high)
-
-    def nearest(self, levels: Array) -> Array:
-        """Training place (2,) m nearest in signal space to levels (a,)."""
-        best = int(np.argmin(np.sum((self._flat - levels) ** 2, axis=1)))
-        j, i = divmod(best, self.levels.shape[1])
-        return np.array([i * self.grain, j * self.grain])
-
-
-def nnss(grid: GridMap, levels: Array) -> Array:
+def nnss(grid: LevelGrid, levels: Array) -> Array:
     """Nearest neighbour in signal space, scan by scan: places (t, 2) m."""
     return np.array([grid.nearest(scan) for scan in levels])
 
 
-def pf_mcl(grid: GridMap, levels: Array, config: Config, seed: int) -> Array:
+def pf_mcl(grid: LevelGrid, levels: Array, config: Config, seed: int) -> Array:
     """Monte Carlo localisation without any information on the walker: places (t, 2) m."""
     return _track(grid, levels, np.zeros((len(levels), 2)), None, config, track_key(seed, "pf_mcl"))
 
 
-def pfmm(grid: GridMap, levels: Array, moved: Array, walls: WallIndex, config: Config, seed: int) -> Array:
+def pfmm(grid: LevelGrid, levels: Array, moved: Array, walls: WallIndex, config: Config, seed: int) -> Array:
     """The thesis' filter: displacements moved (t, 2) m from the phone's sensors, walls that filter: places (t, 2) m."""
     return _track(grid, levels, moved, walls, config, track_key(seed, "pfmm"))
 
 
 def _track(
-    grid: GridMap, levels: Array, moved: Array, walls: WallIndex | None, c: Config, key: tuple[int, int]
+    grid: LevelGrid, levels: Array, moved: Array, walls: WallIndex | None, c: Config, key: tuple[int, int]
 ) -> Array:
     side = (grid.levels.shape[1] - 1) * grid.grain
     motion = DisplacedDisc(r_max=c.r_max, extent=side)
@@ -100,8 +70,7 @@ def _track(
             state, _ = filter_.predict(
                 key, state, motion, (float(moved[t, 0]), float(moved[t, 1])), constraint
             )
-        off = (grid.at(state.cloud.x, state.cloud.y) - scan) / c.kernel_sigma
-        log_likelihood = -0.5 * np.sum(off * off, axis=1)  # Eq. 3.6-3.7
+        log_likelihood = grid.log_likelihood(scan, state.cloud.x, state.cloud.y, c.kernel_sigma)
         weighed = state._replace(log_weights=state.log_weights + log_likelihood)
         w = weighed.weights
         if c.estimate == "best":
