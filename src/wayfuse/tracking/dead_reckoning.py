@@ -19,9 +19,7 @@ __all__ = ["DeadReckoning", "DeadReckoningState", "Start"]
 
 
 _R95 = 1.73  # 95 % of a circular normal law lie within this many sigma
-_FAST_WALK = (
-    1.8  # m/s; few people walk faster indoors, so a silence of t seconds hides at most about this times t
-)
+_FAST_WALK = 1.8  # m/s; few people walk faster indoors
 
 
 class Start(NamedTuple):

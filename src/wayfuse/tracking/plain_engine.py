@@ -144,6 +144,13 @@ class PlainEngine:
         state = PlainState(track_key(seed, track))
         return self._begun(state, None, heading_known=True) if self.starts_unseen else state
 
+    def resume(self, state: PlainState, track: str, seed: int, silence: float) -> PlainState:
+        """State after a long silence: a start that was seen is looked for again; told, the cloud goes on, wider."""
+        if not self.starts_unseen or state.filter is None:
+            return self.init(track, seed)
+        on = PlainState(track_key(seed, track), state.filter)
+        return self.on_quiet(on, silence)
+
     def on_step(self, state: PlainState, event: StepEvent) -> PlainState:
         """Move by a step; before the start there is nothing to move."""
         if not self.uses_steps or state.filter is None:
