@@ -16,7 +16,7 @@ import numpy as np
 
 from wayfuse.core.types import Array
 
-__all__ = ["LogDistance", "fit_log_distance"]
+__all__ = ["Grid", "GridFit", "LogDistance", "fit_log_distance", "grid_about", "grid_fit"]
 
 _HEIGHT = 2.0  # m
 _EXPONENT_PRIOR = 2.5  # indoor path-loss exponents: 1.6 (corridor) to 4 (through walls)
@@ -40,8 +40,35 @@ class LogDistance(NamedTuple):
 
 def _decades(xy: Array, ap_xy: Array) -> Array:
     """10 log10 of the distances (N, m) of places (N, 2) from access points (m, 2)."""
-    squared = ((xy[:, None] - ap_xy[None]) ** 2).sum(axis=-1)
-    return np.asarray(5.0 * np.log10(squared + _HEIGHT**2))
+    dx, dy = (xy[:, None, k] - ap_xy[None, :, k] for k in (0, 1))
+    return np.asarray(5.0 * np.log10(dx * dx + dy * dy + _HEIGHT**2))
+
+
+class Grid(NamedTuple):
+    """Candidate positions xy (g, 2) m, and 10 log10 of their distances (g, n) from the places of readings."""
+
+    xy: Array
+    decades: Array
+
+
+class GridFit(NamedTuple):
+    """Fits of m access points at each of g candidate positions.
+
+    xy (g, 2) m. cost (g, m) dB², weighted squares and the prior of the exponent. exponent (g, m). level (m,) dBm and
+    decades (g, m): mean reading and mean of 10 log10 distance, through which each fit goes.
+    """
+
+    xy: Array
+    cost: Array
+    exponent: Array
+    level: Array
+    decades: Array
+
+    def best(self) -> LogDistance:
+        """The candidate of least cost of each access point."""
+        best, each = np.argmin(self.cost, axis=0), np.arange(self.cost.shape[1])
+        chosen = self.exponent[best, each]
+        return LogDistance(self.xy[best], self.level + chosen * self.decades[best, each], chosen)
 
 
 def fit_log_distance(xy: Array, rssi: Array, weight: Array) -> LogDistance:
@@ -51,8 +78,18 @@ def fit_log_distance(xy: Array, rssi: Array, weight: Array) -> LogDistance:
     ----------
     xy : (n, 2) m. rssi : (n, m) dBm, finite. weight : (n, m) >= 0 with a positive sum per access point.
     """
+    return grid_fit(grid_about(xy), rssi, weight).best()
+
+
+def grid_about(xy: Array) -> Grid:
+    """The candidates for readings made at places (n, 2) m."""
     candidates = _candidates(xy)
-    x = _decades(xy, candidates).T  # (g, n)
+    return Grid(candidates, _decades(xy, candidates).T)
+
+
+def grid_fit(grid: Grid, rssi: Array, weight: Array) -> GridFit:
+    """The fits behind `fit_log_distance`, at every candidate; rssi and weight as there."""
+    candidates, x = grid
     total = weight.sum(axis=0)
     y_mean = (weight * rssi).sum(axis=0) / total
     centred = weight * (rssi - y_mean)
@@ -63,10 +100,7 @@ def fit_log_distance(xy: Array, rssi: Array, weight: Array) -> LogDistance:
     slope = (_PRIOR_WEIGHT * _EXPONENT_PRIOR - sxy) / (sxx + _PRIOR_WEIGHT)
     exponent = np.clip(slope, *_EXPONENT_RANGE)
     cost = syy + 2.0 * exponent * sxy + exponent**2 * sxx + _PRIOR_WEIGHT * (exponent - _EXPONENT_PRIOR) ** 2
-    best = np.argmin(cost, axis=0)
-    each = np.arange(rssi.shape[1])
-    chosen = exponent[best, each]
-    return LogDistance(candidates[best], y_mean + chosen * x_mean[best, each], chosen)
+    return GridFit(candidates, cost, exponent, y_mean, x_mean)
 
 
 def _candidates(xy: Array) -> Array:
