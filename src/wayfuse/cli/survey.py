@@ -1,4 +1,4 @@
-"""``wayfuse survey``: radio maps from recordings with waypoints."""
+"""``wayfuse survey``: radio maps from recordings with waypoints, and the places of access points from a radio map."""
 
 from __future__ import annotations
 
@@ -9,6 +9,8 @@ import click
 
 if TYPE_CHECKING:
     from wayfuse.maps.site import Site
+    from wayfuse.radio.ap_places import ApPlaces
+    from wayfuse.radio.survey import Survey
     from wayfuse.radio.walk_survey import SurveyWalk
 
 __all__ = ["survey"]
@@ -16,7 +18,7 @@ __all__ = ["survey"]
 
 @click.group(context_settings={"help_option_names": ["-h", "--help"]})
 def survey() -> None:
-    """Build radio maps from recordings with waypoints."""
+    """Build radio maps from recordings with waypoints, and place access points."""
 
 
 @survey.command("build")
@@ -74,6 +76,67 @@ class _Reader:
             return None, [str(error)], False
         walk, notes = survey_walk(self.site, recording)
         return walk, [*recording.report.describe(), *notes], True
+
+
+@survey.command("access-points")
+@click.argument("radio_map", metavar="RADIO_MAP", type=click.Path(path_type=Path))
+@click.option("--out", required=True, type=click.Path(path_type=Path), help="CSV to write the places to.")
+@click.option(
+    "--min-places",
+    type=click.IntRange(4),
+    default=8,
+    show_default=True,
+    help="Cells of 2 m in which an access point must have been heard on its floor.",
+)
+@click.option(
+    "--most-sigma",
+    type=click.FloatRange(0.0, min_open=True),
+    help="Leave out places with a wider standard deviation (m).",
+)
+@click.option("--json", "as_json", is_flag=True, help="Print what was estimated as JSON.")
+def access_points_command(
+    radio_map: Path, out: Path, min_places: int, most_sigma: float | None, as_json: bool
+) -> None:
+    """Estimate where the access points of RADIO_MAP hang, and write bssid,x,y,floor,height,sigma.
+
+    They are estimates, and the file says so (its column sigma): measured places are better, where there are any.
+    """
+    from wayfuse.cli.work import check_target
+    from wayfuse.radio.ap_estimation import EstimationParameters, estimate_places
+    from wayfuse.radio.ap_places import write_ap_places
+    from wayfuse.radio.walk_survey import load
+
+    check_target(out)
+    built = load(radio_map).survey
+    found = estimate_places(built, EstimationParameters(min_places=min_places))
+    if most_sigma is not None and found.sigma is not None:
+        found = found.select(found.sigma <= most_sigma)
+    write_ap_places(out, found, built.floors)
+    _render_places(found, built, out, as_json)
+
+
+def _render_places(found: ApPlaces, built: Survey, out: Path, as_json: bool) -> None:
+    import json
+
+    import numpy as np
+
+    counts = np.bincount(found.floor, minlength=len(built.floors)).tolist()
+    sigma = float(np.median(found.sigma)) if found.sigma is not None and len(found) else None
+    document = {
+        "access_points": str(out),
+        "heard": len(built.bssid),
+        "placed": len(found),
+        "median_sigma_m": None if sigma is None else round(sigma, 2),
+        "placed_by_floor": dict(zip(built.floors, counts, strict=True)),
+    }
+    if as_json:
+        click.echo(json.dumps(document, indent=1, ensure_ascii=False))
+        return
+    spread = "" if sigma is None else f", median standard deviation {sigma:.1f} m"
+    click.echo(f"places of {len(found)} of {len(built.bssid)} access points estimated{spread}")
+    for name, count in zip(built.floors, counts, strict=True):
+        click.echo(f"  {name:<8}{count:>7} access points")
+    click.echo(f"written to {out}")
 
 
 def _render(built: Any, n_walks: int, n_paths: int, out: Path, as_json: bool) -> None:
