@@ -9,7 +9,8 @@ import pytest
 
 from wayfuse.core.errors import ConfigError
 from wayfuse.core.philox import Noise
-from wayfuse.models.initial import FirstCloud
+from wayfuse.maps.walkable import Walkable
+from wayfuse.models.initial import Anywhere, FirstCloud
 from wayfuse.models.observation.fingerprint import FingerprintLikelihood
 from wayfuse.radio.sparse_knn import Neighbours
 
@@ -67,3 +68,28 @@ def test_no_walkable_space_nearby_does_not_stop_it(world: Any) -> None:
 def test_negative_spreads_are_refused() -> None:
     with pytest.raises(ConfigError, match="must not be negative"):
         FirstCloud(observation=OBSERVATION, bias_sigma=-0.1)
+
+
+def test_anywhere_is_even_over_the_walkable_space_of_all_floors() -> None:
+    small = Walkable((0.0, 0.0), 0.5, np.ones((4, 4), np.uint8))  # 4 m²
+    mask = np.zeros((20, 20), np.uint8)
+    mask[:, :12] = 1  # 60 m², x from 10 to 16
+    large = Walkable((10.0, 0.0), 0.5, mask)
+    cloud = Anywhere(walkable=(small, large), bias_sigma=0.2).draw(Noise.of(1, "a"), 20_000)
+    assert set(cloud.floor.tolist()) == {0, 1}
+    assert float(np.mean(cloud.floor == 0)) == pytest.approx(4.0 / 64.0, abs=0.006)
+    up = cloud.floor == 1
+    assert large.contains(cloud.x[up], cloud.y[up]).all()
+    assert small.contains(cloud.x[~up], cloud.y[~up]).all()
+    counts, _ = np.histogram(
+        cloud.x[up], bins=np.linspace(10.0, 16.0, 25)
+    )  # half cells: no place is a favourite
+    assert counts.min() > 0.85 * counts.mean()
+    assert float(np.std(cloud.heading_bias)) == pytest.approx(0.2, rel=0.05)
+    turned = Anywhere(walkable=(small,)).draw(Noise.of(1, "a"), 5000, heading_known=False)
+    assert float(np.abs(turned.heading_bias).max()) > 3.0
+
+
+def test_anywhere_needs_somewhere() -> None:
+    with pytest.raises(ConfigError, match="no floor has walkable space"):
+        Anywhere(walkable=(Walkable((0.0, 0.0), 0.5, np.zeros((4, 4), np.uint8)),))

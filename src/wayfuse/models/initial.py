@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
 from wayfuse.core.errors import ConfigError
 from wayfuse.core.philox import Noise
-from wayfuse.core.types import Array32, BoolArray
+from wayfuse.core.types import Array, Array32, BoolArray
 from wayfuse.filters.cloud import Cloud
 from wayfuse.maps.walkable import Walkable
 from wayfuse.models.observation.fingerprint import FingerprintLikelihood
 from wayfuse.radio.sparse_knn import Neighbours
 
-__all__ = ["FirstCloud", "KnownStart"]
+__all__ = ["Anywhere", "FirstCloud", "KnownStart"]
 
 _SPARE = 4  # places drawn per particle; a quarter to a third of a floor is walkable, near the survey more
 
@@ -90,6 +90,41 @@ class KnownStart:
         y = (np.float32(self.y) + np.float32(self.sigma) * z[1]).astype(np.float32)
         bias, scale = _gait(noise, n, self.bias_sigma, self.scale_sigma, heading_known=self.heading_known)
         return Cloud.on_floors(x, y, bias, scale, np.full(n, self.floor, np.int32))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Anywhere:
+    """Draws particles uniformly over the walkable space of all floors: nothing is known but the building.
+
+    Parameters
+    ----------
+    walkable : mask per floor. bias_sigma, scale_sigma : as of `FirstCloud`.
+    """
+
+    walkable: tuple[Walkable, ...]
+    bias_sigma: float = 0.25
+    scale_sigma: float = 0.1
+    _centres: Array = field(init=False, repr=False)
+    _floor: NDArray[np.int32] = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        centres = [floor.centres() for floor in self.walkable]
+        if not sum(len(c) for c in centres):
+            raise ConfigError("no floor has walkable space", where="Anywhere", remedy="check the plan")
+        object.__setattr__(self, "_centres", np.concatenate(centres))
+        object.__setattr__(self, "_floor", np.repeat(np.arange(len(centres)), [len(c) for c in centres]))
+
+    def draw(self, noise: Noise, n: int, *, heading_known: bool = True) -> Cloud:
+        """n particles, each in a cell of its own drawing."""
+        u = noise.uniforms(n)
+        cell = np.minimum((u[0] * len(self._floor)).astype(np.int64), len(self._floor) - 1)
+        floor = self._floor[cell].astype(np.int32)
+        edge = np.array([walkable.cell for walkable in self.walkable])[floor]
+        jitter = (u[0] * len(self._floor)) % 1.0  # what the cell leaves of the first uniform is uniform too
+        x = self._centres[cell, 0] + edge * (jitter - 0.5)
+        y = self._centres[cell, 1] + edge * (u[1] - 0.5)
+        bias, scale = _gait(noise, n, self.bias_sigma, self.scale_sigma, heading_known=heading_known)
+        return Cloud.on_floors(x.astype(np.float32), y.astype(np.float32), bias, scale, floor)
 
 
 def _gait(

@@ -17,10 +17,11 @@ from wayfuse.filters.particle_filter import (
     Snapshot,
     replace_particles,
 )
+from wayfuse.filters.resampling import systematic
 from wayfuse.inertial.front_end import StepEvent
 from wayfuse.inertial.vertical import VerticalEvent
 from wayfuse.maps.walkable import Walkable
-from wayfuse.models.initial import KnownStart
+from wayfuse.models.initial import Anywhere, KnownStart
 from wayfuse.models.motion.pdr import PdrMotion, StepInput
 from wayfuse.models.motion.random_walk import RandomWalk
 from wayfuse.radio.device_offset import OffsetState
@@ -83,6 +84,7 @@ class Recovery:
         return self.injection_least + self.injection * (1.0 - min(agreement, 1.0)) ** 2
 
 
+_SCATTERED = 16  # places tried per particle where ranges begin a track
 _UNCORROBORATED = 10  # steps before which no walk has told the floors apart
 
 
@@ -114,7 +116,8 @@ class ParticleEngine:
     Parameters
     ----------
     n_floors : of the site. radio : what answers scans, None = Wi-Fi is not used. ranging : what answers ranges of known
-    anchors, None = they are not used; they refine a track that a scan or a start began. start : where the track starts,
+    anchors, None = they are not used. anywhere : where a track that only ranges speak of begins, None = it waits for
+    a scan or a start. start : where the track starts,
     None = at the first scan; one of the two is needed. prior : the estimate before. motion, constraint : of steps;
     constraint None = no map. diffusion : motion while no motion sensor speaks. floor_change : takes the cloud over
     stairs and lifts, None = floors change by scans only. walkable : mask per floor that estimates are kept on, empty =
@@ -128,6 +131,7 @@ class ParticleEngine:
     diffusion: RandomWalk
     radio: Radio | None = None
     ranging: RangeObservation | None = None
+    anywhere: Anywhere | None = None
     start: KnownStart | None = None
     constraint: Constraint | None = None
     filter: ParticleFilter = field(default_factory=ParticleFilter)
@@ -145,11 +149,11 @@ class ParticleEngine:
             raise ConfigError(
                 f"n_particles must be at least 10, got {self.n_particles}", where="ParticleEngine"
             )
-        if self.radio is None and self.start is None:
+        if self.radio is None and self.start is None and (self.ranging is None or self.anywhere is None):
             raise ConfigError(
-                "neither a radio map nor a start",
+                "neither a radio map nor a start nor ranges",
                 where="ParticleEngine",
-                remedy="give radio, start, or both: nobody can be found by steps alone",
+                remedy="give radio, start, or ranging with anywhere: nobody can be found by steps alone",
             )
 
     def init(self, track: str, seed: int) -> ParticleState:
@@ -240,16 +244,31 @@ class ParticleEngine:
         self, state: ParticleState, t: float, ranges: Sequence[Range], known: Known
     ) -> ParticleState:
         """Weigh by the ranges of one moment; those of unknown anchors change nothing."""
+        if self.ranging is None:
+            return state
+        if state.filter is None:
+            return self._begun_by_ranges(state, self.ranging, ranges, known)
         log_likelihood = np.zeros(self.n_particles)
-        if (
-            self.ranging is None
-            or state.filter is None
-            or not self.ranging.log_likelihood(state.filter.cloud, ranges, log_likelihood)
-        ):
+        if not self.ranging.log_likelihood(state.filter.cloud, ranges, log_likelihood):
             return state
         after, info = self.filter.update(state.key, state.filter, log_likelihood)
         why = state.why._replace(n_aps=max(state.why.n_aps, len(ranges)))
         return state._replace(filter=after, why=why, ess=info.ess / self.n_particles)
+
+    def _begun_by_ranges(
+        self, state: ParticleState, ranging: RangeObservation, ranges: Sequence[Range], known: Known
+    ) -> ParticleState:
+        """The first cloud: the best of many that are anywhere."""
+        if self.anywhere is None:
+            return state
+        noise, n = Noise(state.key), _SCATTERED * self.n_particles
+        cloud = self.anywhere.draw(noise, n, heading_known=known.heading)
+        log_weights = np.zeros(n)
+        if not ranging.log_likelihood(cloud, ranges, log_weights):
+            return state
+        many = FilterState(cloud, log_weights, noise.draw)
+        chosen = cloud.take(systematic(noise, many.weights, self.n_particles))
+        return state._replace(filter=FilterState(chosen, np.zeros(self.n_particles), noise.draw))
 
     def _weigh(
         self,
