@@ -66,6 +66,8 @@ def summary(recording: Recording, kind: str) -> dict[str, Any]:
         "orientation": _series(recording.orientation),
         "wifi_scans": _events([s.t for s in recording.wifi]),
         "ble": _events([b.t for b in recording.ble]),
+        "ranges": _events([r.t for r in recording.ranges]),
+        "csi": _events([c.t for c in recording.csi]),
     }
     readings = sum(len(s.bssid) for s in recording.wifi)
     return {
@@ -83,6 +85,7 @@ def summary(recording: Recording, kind: str) -> dict[str, Any]:
         "records": records,
         "wifi_readings": readings,
         "access_points": len({int(b) for s in recording.wifi for b in s.bssid}),
+        "anchors": len({r.anchor for r in recording.ranges} | {c.anchor for c in recording.csi}),
         "waypoints": [
             {"t": w.t, **{k: v for k, v in w._asdict().items() if k != "t" and v == v and v != ""}}  # noqa: PLR0124
             for w in recording.waypoints
@@ -130,6 +133,8 @@ def _print(answer: dict[str, Any]) -> None:
         click.echo(
             f"  Wi-Fi       {answer['wifi_readings']} readings of {answer['access_points']} access points"
         )
+    if answer["anchors"]:
+        click.echo(f"  anchors     {answer['anchors']}")
     click.echo(f"  waypoints   {len(answer['waypoints'])}")
     for what, issue in answer["issues"].items():
         more = ", ..." if issue["count"] > len(issue["lines"]) else ""

@@ -27,19 +27,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wayfuse.core.errors import FormatError
+from wayfuse.formats.bounded import read_bounded
+from wayfuse.formats.card_clock import CardClock
 from wayfuse.sensors.quality import ReadReport
 from wayfuse.sensors.recording import Recording
 from wayfuse.sensors.records import CsiFrame
 
-__all__ = ["N_GROUPS", "Head", "read"]
+__all__ = ["N_GROUPS", "Head", "is_log", "read"]
 
 N_GROUPS = 30  # groups of subcarriers
 _CSI = 0xBB
 _HEAD = struct.Struct("<IHHBBBBBbBBHH")
 _NO_NOISE = -127  # dBm, the card's word for "unknown"
 _RSSI_OFFSET = 44.0  # dB, from the card's units to dBm with the gain known
-_WRAP = 1 << 32  # µs
 _MOST_ANTENNAS = 3
+_MOST_BYTES = 1 << 30  # of a log: an hour and more at 1000 packets a second
+_LOOK = 64  # records to look at for the first packet
 
 
 class Head(NamedTuple):
@@ -77,6 +80,20 @@ class Head(NamedTuple):
         return order if is_sound else list(range(self.n_rx))
 
 
+def is_log(head: bytes) -> bool:
+    """Whether the first bytes of a file are such a log: records in a row, one of them a sound packet."""
+    at = 0
+    for _ in range(_LOOK):
+        size = int.from_bytes(head[at : at + 2], "big")
+        body = head[at + 3 : at + 2 + size]
+        if size == 0 or len(body) < size - 1:
+            return False
+        if head[at + 2] == _CSI:
+            return not _fault(body)
+        at += 2 + size
+    return False
+
+
 def read(path: str | Path, *, anchor: int = 0) -> Recording:
     """Read a whole log.
 
@@ -92,13 +109,13 @@ def read(path: str | Path, *, anchor: int = 0) -> Recording:
 
     Raises
     ------
-    FormatError : there is no whole record of channel state in the file.
+    DataMissingError : there is no such file. FormatError : it is too large, or has no whole record of channel state.
     """
     path = Path(path)
     report = ReadReport(path=str(path))
     frames: list[CsiFrame] = []
-    clock = _Clock()
-    for number, head, payload in _records(path.read_bytes(), report):
+    clock = CardClock()
+    for number, head, payload in _records(read_bounded(path, _MOST_BYTES), report):
         t, noise = clock.seconds(head.timestamp_low), float(head.noise if head.noise != _NO_NOISE else "nan")
         if frames and t < frames[-1].t:
             report.add("a clock that steps back", number)
@@ -110,20 +127,6 @@ def read(path: str | Path, *, anchor: int = 0) -> Recording:
     report.n_records["CSI"] = len(frames)
     frames.sort(key=lambda frame: frame.t)
     return Recording(path.stem, csi=tuple(frames), clock="network card", path=str(path), report=report)
-
-
-class _Clock:
-    """Undoes the wraps of the card's clock."""
-
-    def __init__(self) -> None:
-        self._last, self._base = 0, 0
-
-    def seconds(self, low: int) -> float:
-        """Time of a record (s) from its 32 bits (µs); a step back of less than half a wrap is no wrap."""
-        if self._last - low > _WRAP // 2:
-            self._base += _WRAP
-        self._last = low
-        return 1e-6 * (self._base + low)
 
 
 def _records(data: bytes, report: ReadReport) -> Iterator[tuple[int, Head, bytes]]:

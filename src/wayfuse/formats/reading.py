@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 
 from wayfuse.core.errors import DataMissingError, FormatError, UsageError
@@ -11,7 +11,10 @@ from wayfuse.sensors.recording import Recording
 
 __all__ = ["FORMATS", "expand", "read", "sniff"]
 
-FORMATS = ("ms-indoor", "getsensordata", "sensor-logger", "hcu")
+FORMATS = (
+    "ms-indoor", "getsensordata", "sensor-logger", "hcu", "wifi-rtt", "intel5300", "nexmon", "esp32-csi",
+)  # fmt: skip
+_OF_FOLDERS = {"sensor-logger", "hcu"}
 _HEAD_BYTES = 1 << 16
 _MS_INDOOR = re.compile(rb"^\d{13}\tTYPE_[A-Z]", re.MULTILINE)
 _GETSENSORDATA = re.compile(
@@ -38,7 +41,7 @@ def read(path: str | Path, *, format: str | None = None, platform: str | None = 
     if not path.exists():
         raise DataMissingError("no such file or folder", where=path)
     kind = format if format is not None else sniff(path)
-    if path.is_dir() and kind in {"ms-indoor", "getsensordata"}:
+    if path.is_dir() and kind in FORMATS and kind not in _OF_FOLDERS:
         raise FormatError(f"a folder, where {kind} is a file", where=path)
     if kind == "ms-indoor":
         from wayfuse.formats import ms_indoor
@@ -56,7 +59,22 @@ def read(path: str | Path, *, format: str | None = None, platform: str | None = 
         from wayfuse.formats import hcu
 
         return hcu.read(path)
+    if kind in FORMATS:
+        return _read_ranging(path, kind)
     raise UsageError(f"unknown format {kind!r}", where="format", remedy=f"use one of {', '.join(FORMATS)}")
+
+
+def _read_ranging(path: Path, kind: str) -> Recording:
+    """Read a recording of ranges or channel state."""
+    from wayfuse.formats import esp32_csi, intel5300, nexmon, wifi_rtt
+
+    readers: Mapping[str, Callable[[Path], Recording]] = {
+        "wifi-rtt": wifi_rtt.read,
+        "intel5300": intel5300.read,
+        "nexmon": nexmon.read,
+        "esp32-csi": esp32_csi.read,
+    }
+    return readers[kind](path)
 
 
 def sniff(path: str | Path) -> str:
@@ -141,9 +159,24 @@ def _sniff(path: Path) -> str | None:
             return "ms-indoor"
         if _GETSENSORDATA.search(head):
             return "getsensordata"
+        ranging = _sniff_ranging(head)
+        if ranging is not None:
+            return ranging
     from wayfuse.formats import hcu
     from wayfuse.formats.sensor_logger_tables import is_recording
 
     if is_recording(path):
         return "sensor-logger"
     return "hcu" if hcu.is_recording(path) else None
+
+
+def _sniff_ranging(head: bytes) -> str | None:
+    from wayfuse.formats import esp32_csi, intel5300, nexmon, wifi_rtt
+
+    if wifi_rtt.is_table(head):
+        return "wifi-rtt"
+    if nexmon.is_capture(head):
+        return "nexmon"
+    if esp32_csi.is_log(head):
+        return "esp32-csi"
+    return "intel5300" if intel5300.is_log(head) else None
