@@ -1,0 +1,1 @@
+"""The live server: phones and anchors in, positions out."""

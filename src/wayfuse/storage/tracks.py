@@ -1,0 +1,134 @@
+"""Tracks: settled estimates, and checkpoints to go on from; written together, so that they always fit.
+
+A checkpoint round says: all of the log up to ``seq`` is in the states and estimates written with it. A server that
+starts reads the states and then the log after ``seq``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import Any, NamedTuple
+
+from sqlalchemy import Connection, Engine, delete, func, insert, select, update
+
+from wayfuse.storage.schema import checkpoints, counters, estimates, ingest_log, tracks
+from wayfuse.tracking.estimate import Estimate, State
+
+__all__ = ["Checkpoint", "TrackRow", "TrackStore"]
+
+_ROUND = "checkpoint"
+_COLUMNS = [estimates.c[name] for name in Estimate._fields]
+
+
+class TrackRow(NamedTuple):
+    """A track: its pseudonym, site and phone, the version of the radio map it is tracked with, and when (Unix s)."""
+
+    track: str
+    site: str
+    device: str
+    map_version: int
+    started: float
+    heard: float
+
+
+class Checkpoint(NamedTuple):
+    """What a round keeps of a track: estimates that can no longer change, from number ``first`` on, and the state."""
+
+    row: TrackRow
+    first: int
+    settled: Sequence[Estimate]
+    state: bytes
+
+
+class TrackStore:
+    """Tracks of a database."""
+
+    def __init__(self, engine: Engine) -> None:
+        self._engine = engine
+
+    def save(self, seq: int, kept: Iterable[Checkpoint]) -> None:
+        """Write a round in one transaction."""
+        with self._engine.begin() as connection:
+            for each in kept:
+                _save(connection, seq, each)
+            connection.execute(delete(counters).where(counters.c.name == _ROUND))
+            connection.execute(insert(counters).values(name=_ROUND, value=seq))
+
+    def round(self) -> int:
+        """The seq of the last round, 0 before the first."""
+        with self._engine.connect() as connection:
+            found = connection.execute(select(counters.c.value).where(counters.c.name == _ROUND)).scalar()
+        return int(found or 0)
+
+    def state(self, track: str) -> tuple[TrackRow, bytes] | None:
+        """A track and its checkpoint."""
+        with self._engine.connect() as connection:
+            row = connection.execute(select(tracks).where(tracks.c.track == track)).first()
+            state = connection.execute(
+                select(checkpoints.c.state).where(checkpoints.c.track == track)
+            ).scalar()
+        return None if row is None or state is None else (TrackRow(*row), bytes(state))
+
+    def newest(self, heard_after: float = 0.0, *, device: str | None = None) -> list[TrackRow]:
+        """Tracks heard after a time, the last heard first."""
+        query = select(tracks).where(tracks.c.heard > heard_after).order_by(tracks.c.heard.desc())
+        if device is not None:
+            query = query.where(tracks.c.device == device)
+        with self._engine.connect() as connection:
+            return [TrackRow(*row) for row in connection.execute(query)]
+
+    def estimates(self, track: str, since: float | None = None, until: float | None = None) -> list[Estimate]:
+        """Settled estimates in time order, of a span of the phone's time."""
+        query = select(*_COLUMNS).where(estimates.c.track == track).order_by(estimates.c.n)
+        if since is not None:
+            query = query.where(estimates.c.t >= since)
+        if until is not None:
+            query = query.where(estimates.c.t <= until)
+        with self._engine.connect() as connection:
+            return [_estimate(row) for row in connection.execute(query)]
+
+    def last_estimate(self, track: str) -> Estimate | None:
+        """The last settled estimate."""
+        query = select(*_COLUMNS).where(estimates.c.track == track).order_by(estimates.c.n.desc()).limit(1)
+        with self._engine.connect() as connection:
+            row = connection.execute(query).first()
+        return None if row is None else _estimate(row)
+
+    def forget(self, device: str) -> int:
+        """Delete all of a phone, its part of the log too; how many tracks it had."""
+        with self._engine.begin() as connection:
+            names = select(tracks.c.track).where(tracks.c.device == device)
+            n = connection.execute(
+                select(func.count()).select_from(tracks).where(tracks.c.device == device)
+            ).scalar_one()
+            connection.execute(delete(checkpoints).where(checkpoints.c.track.in_(names)))
+            connection.execute(delete(estimates).where(estimates.c.track.in_(names)))
+            connection.execute(delete(tracks).where(tracks.c.device == device))
+            # the rows stay as empty ones: seq has no gaps, and its last value is never lost
+            gone = {"body": b"", "device": "", "track": "", "profile": "", "adapter": "deleted"}
+            connection.execute(update(ingest_log).where(ingest_log.c.device == device).values(**gone))
+            return int(n)
+
+
+def _save(connection: Connection, seq: int, kept: Checkpoint) -> None:
+    name = kept.row.track
+    known = connection.execute(select(tracks.c.track).where(tracks.c.track == name)).first()
+    if known is None:
+        connection.execute(insert(tracks).values(**kept.row._asdict()))
+        connection.execute(insert(checkpoints).values(track=name, seq=seq, state=kept.state))
+    else:
+        connection.execute(update(tracks).where(tracks.c.track == name).values(**kept.row._asdict()))
+        connection.execute(
+            update(checkpoints).where(checkpoints.c.track == name).values(seq=seq, state=kept.state)
+        )
+    if kept.settled:
+        rows = [
+            {"track": name, "n": n, **e._asdict(), "state": e.state.value}
+            for n, e in enumerate(kept.settled, kept.first)
+        ]
+        connection.execute(insert(estimates), rows)
+
+
+def _estimate(row: Any) -> Estimate:
+    e = Estimate(*row)
+    return e._replace(state=State(row.state))
