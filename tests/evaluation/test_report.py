@@ -137,6 +137,17 @@ def test_what_was_not_scored_is_named() -> None:
     assert report["unscored"] == [{"walk": "b", "reason": "recording without waypoints"}]
 
 
+def test_between_two_floors_nobody_is_on_the_wrong_one() -> None:
+    points = (Waypoint(100.0, 0, 0, "B1"), Waypoint(104.0, 4, 0, "B1"), Waypoint(114.0, 4, 0, "F2"))
+    walks = [recording("a", (*points, Waypoint(116.0, 6, 0, "F2")), scans=(100.0,))]
+    # three seconds late on the upper floor, and wrong at its first waypoint
+    late = [track([100.0, 114.5], [(0, 0), (4, 0)], floor=["B1", "F2"], walk="a")]
+    of = build_report(score(late, walks, House()), bootstrap=QUICK)["methods"]["m"]["1hz"]
+    assert (of["n"], of["n_in_transit"]) == (17, 9)
+    assert of["floor_accuracy"] == pytest.approx(12 / 17)
+    assert of["known_floor_accuracy"] == pytest.approx(7 / 8)
+
+
 def test_long_lists_of_names_are_cut_in_the_text_only() -> None:
     walks = [recording("a"), *(recording(f"x{i}") for i in range(9))]
     report = build_report(score([track([101.0], [(0, 0)])], walks), bootstrap=QUICK)

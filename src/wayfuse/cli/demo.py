@@ -143,12 +143,14 @@ def _table(report: dict[str, Any]) -> str:
     rows = []
     for name, method in report["methods"].items():
         of = method["1hz"]
-        floor = "-" if of["floor_accuracy"] is None else f"{100 * of['floor_accuracy']:.1f} %"
+        share = of["known_floor_accuracy"]
+        floor = "-" if share is None else f"{100 * share:.1f} %"
         rows.append(
             [name, *("-" if of[k] is None else f"{of[k]:.2f}" for k in ("mean", "p50", "p90")), floor]
         )
     title = "\nError (m) of the simulated walks, once a second from the first scan on"
-    return table(title, ["method", "mean", "median", "90 %", "right floor"], rows)
+    note = "The floor is looked at where both waypoints around are on one: between two floors the truth is not known."
+    return table(title, ["method", "mean", "median", "90 %", "right floor"], rows) + f"\n\n{note}"
 
 
 def _say(line: str) -> None:

@@ -97,6 +97,10 @@ class PointErrors:
         rows = np.ones(len(self), np.bool_) if missing == "all" else self.since_start >= -TIME_TOLERANCE
         return self.select(rows & ~self.missing if missing == "skip" else rows)
 
+    def of_known_floor(self) -> PointErrors:
+        """Without the moments between two waypoints on different floors: nobody knows the floor then."""
+        return self.select(~self.transit)
+
     @property
     def availability(self) -> float:
         """Share of the times from the first scan on that have an estimate; NaN without any time."""

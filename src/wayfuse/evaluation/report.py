@@ -104,6 +104,7 @@ def _method(method: MethodScores, scores: Scores, missing: str, draw: Bootstrap)
         out[at] = asdict(summarise(points)) | {
             "intervals": intervals,
             "n_in_transit": int(points.transit.sum()),
+            "known_floor_accuracy": summarise(points.of_known_floor()).floor_accuracy,
         }
         out[f"{at}_all_times"] = asdict(summarise(method.points[at].used("all")))
     at_1hz = method.points["1hz"].used(missing)
@@ -339,8 +340,12 @@ def _notes(report: Report) -> str:
     lines += [f"Not scored, {reason}: {_names(walks)}." for reason, walks in reasons.items()]
     between = max((m["1hz"]["n_in_transit"] for m in report["methods"].values()), default=0)
     if between:
+        shares = ", ".join(
+            f"{name} {_percent(m['1hz']['known_floor_accuracy'])}" for name, m in report["methods"].items()
+        )
         lines.append(
             f"{between} points at 1 Hz lie between waypoints of two floors; the nearer in time is the truth."
+            f" Right floor without them: {shares}."
         )
     return "\n".join([*lines, *report["notes"]])
 

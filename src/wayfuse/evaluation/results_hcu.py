@@ -119,9 +119,8 @@ def _figures(
         "delays": delays.tolist(),
     }
     for at in TIMES:
-        points = PointErrors.join([m.points[at].used() for m in scored])
-        # between two waypoints on different floors nobody knows the floor
-        out[at] = asdict(summarise(points.select((points.walk == walk) & ~points.transit)))
+        points = PointErrors.join([m.points[at].used() for m in scored]).of_known_floor()
+        out[at] = asdict(summarise(points.select(points.walk == walk)))
     return out
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, replace
 from typing import Any
 
@@ -48,7 +48,7 @@ def measure_ipin2023(
     tracked = track(repetitions, methods, seeds, mapper)
     away = track(repetitions, off_route, seeds, mapper, off_route=True)
     groups = _groups(tracked.scores)
-    off = {name: _known(p) for name, p in pool(away.scores).items()}
+    off = _known(away.scores)
     section: dict[str, Any] = {
         "recordings": len(repetitions.recordings),
         "minutes": minutes_of(repetitions.recordings),
@@ -76,7 +76,7 @@ def measure_ipin2023(
 def _groups(scores: Sequence[Scores]) -> dict[str, dict[str, Pooled]]:
     """Methods over all recordings, over those that stay on a floor, and over those that do not."""
     changes = np.array([key_of(walk).changes_floors for of in scores for walk in of.walks])
-    pooled = {name: _known(p) for name, p in pool(scores).items()}
+    pooled = _known(scores)
     wanted = {ALL: np.ones(len(changes), np.bool_), SINGLE: ~changes, CONNECTORS: changes}
     return {
         group: {name: of_walks(p, rows) for name, p in pooled.items()}
@@ -87,16 +87,16 @@ def _groups(scores: Sequence[Scores]) -> dict[str, dict[str, Pooled]]:
 
 def of_walks(pooled: Pooled, wanted: BoolArray) -> Pooled:
     """The points of the walks for which ``wanted`` (n_walks,) holds."""
-    return _select(pooled, lambda points: np.asarray(wanted[points.walk]))
+    return _each(pooled, lambda points: points.select(np.asarray(wanted[points.walk])))
 
 
-def _known(pooled: Pooled) -> Pooled:
-    """Without the moments between two waypoints on different floors: nobody knows the floor then."""
-    return _select(pooled, lambda points: ~points.transit)
+def _known(scores: Sequence[Scores]) -> dict[str, Pooled]:
+    """All methods where the truth knows the floor."""
+    return {name: _each(p, PointErrors.of_known_floor) for name, p in pool(scores).items()}
 
 
-def _select(pooled: Pooled, rows: Any) -> Pooled:
-    seeds = tuple({at: p.select(rows(p)) for at, p in seed.items()} for seed in pooled.seeds)
+def _each(pooled: Pooled, kept: Callable[[PointErrors], PointErrors]) -> Pooled:
+    seeds = tuple({at: kept(points) for at, points in seed.items()} for seed in pooled.seeds)
     return replace(pooled, seeds=seeds)
 
 
