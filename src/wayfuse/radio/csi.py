@@ -22,21 +22,30 @@ from wayfuse.core.errors import ConfigError
 from wayfuse.core.types import Array, IntArray
 from wayfuse.sensors.records import CsiFrame
 
-__all__ = ["INTEL5300_20MHZ", "direct_path_power", "impulse_response"]
+__all__ = ["INTEL5300_20MHZ", "direct_path_power", "fourier_order", "impulse_response"]
 
 # subcarriers of the 30 groups at 20 MHz (IEEE 802.11n, grouping 2)
 INTEL5300_20MHZ: IntArray = np.array([*range(-28, -1, 2), -1, *range(1, 28, 2), 28])
-_N_FFT = 64  # subcarriers of a 20 MHz channel
 _OVERSAMPLING = 4  # taps per 1 / bandwidth: between two of 1 / bandwidth a peak would lose up to 3.9 dB
+
+
+def fourier_order(n: int) -> IntArray:
+    """Subcarriers of n values in the order of a Fourier transform: 0, 1, ..., n/2 - 1, -n/2, ..., -1 (Nexmon, ESP32).
+
+    >>> fourier_order(4).tolist()
+    [0, 1, -2, -1]
+    """
+    return np.asarray((np.arange(n) + n // 2) % n - n // 2)
 
 
 def impulse_response(
     csi: NDArray[np.complexfloating], subcarriers: IntArray = INTEL5300_20MHZ
 ) -> NDArray[np.complex128]:
-    """Channel impulse response (..., 256) of channel state (..., n) at ``subcarriers`` (n,).
+    """Channel impulse response (..., m) of channel state (..., n) at ``subcarriers`` (n,).
 
-    Taps are 12.5 ns apart over the 3.2 µs of a symbol, in any rotation, for a receiver's timing is arbitrary. Of a
-    channel with one path the greatest magnitude is that of the channel.
+    m is four times the subcarriers of the channel: 256 taps at 20 MHz, 12.5 ns apart over the 3.2 µs of a symbol, in
+    any rotation, for a receiver's timing is arbitrary. Of a channel with one path the greatest magnitude is that of
+    the channel.
 
     Raises
     ------
@@ -44,7 +53,9 @@ def impulse_response(
     """
     if csi.shape[-1] != len(subcarriers):
         raise ConfigError(f"channel state of {csi.shape[-1]} subcarriers, {len(subcarriers)} expected")
-    n = _N_FFT * _OVERSAMPLING
+    n = _OVERSAMPLING * (
+        1 << int(2 * np.abs(subcarriers).max() - 1).bit_length()
+    )  # 64, 128, 256 of 20, 40, 80 MHz
     spectrum = np.zeros((*csi.shape[:-1], n), dtype=np.complex128)
     spectrum[..., subcarriers % n] = csi
     return np.asarray(np.fft.ifft(spectrum, axis=-1) * (n / len(subcarriers)))
