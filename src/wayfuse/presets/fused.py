@@ -14,7 +14,7 @@ from typing import Literal
 
 import numpy as np
 
-from wayfuse.core.errors import ConfigError, RadioMapError
+from wayfuse.core.errors import ConfigError, RadioMapError, UsageError
 from wayfuse.filters.particle_filter import Constraint, ParticleFilter
 from wayfuse.filters.resampling import resampler
 from wayfuse.inertial.vertical_front_end import VerticalConfig, VerticalFrontEnd
@@ -22,13 +22,15 @@ from wayfuse.maps.site import Site
 from wayfuse.maps.walkable import Walkable
 from wayfuse.models.constraint.barriers import Barriers
 from wayfuse.models.constraint.walkable_mask import WalkableMask
-from wayfuse.models.initial import FirstCloud, KnownStart
+from wayfuse.models.initial import Anywhere, FirstCloud, KnownStart
 from wayfuse.models.motion.connectors import ConnectorMotion
 from wayfuse.models.motion.pdr import PdrMotion
 from wayfuse.models.motion.random_walk import RandomWalk
+from wayfuse.models.observation.anchored_ranges import AnchoredRanges
 from wayfuse.models.observation.coverage import SurveyDistance
 from wayfuse.models.observation.fingerprint import FingerprintLikelihood
 from wayfuse.models.observation.neighbouring import NeighbouringFloors
+from wayfuse.radio.ap_places import ApPlaces
 from wayfuse.radio.device_offset import DeviceOffset
 from wayfuse.radio.sparse_knn import SparseKnn
 from wayfuse.radio.survey import Survey
@@ -46,6 +48,7 @@ __all__ = [
     "CALIBRATED",
     "Config",
     "build",
+    "build_from_ranges",
     "build_from_start",
     "check_floors",
     "prior_estimate",
@@ -89,6 +92,11 @@ class Config:
     diffusion: float = 4.0  # m per root second and axis, where motion sensors are silent
     quiet_exponent: float = 2.0  # tempering there; both as the random walk tuned for itself
     moving_gain: float = 0.3  # of a scan's log-likelihood on stairs and in lifts
+    # ranges: round-trip times indoors are good to a metre in sight, and late behind walls and bodies
+    range_sigma: float = 1.0  # m
+    range_late: float = 0.3
+    range_lateness: float = 3.0  # m
+    range_gain: float = 0.5
     map_constraint: Literal["walkable", "barriers", "none"] = "walkable"
     use_steps: bool = True
     device_offset: bool = True  # estimate how the phone's levels differ from the survey's
@@ -103,9 +111,12 @@ def build(
     config: Config | None = None,
     *,
     start: Start | None = None,
+    places: ApPlaces | None = None,
     lag: float = 0.0,
 ) -> Tracker[ParticleState]:
     """The tracker of a site and a survey of it; a start that is known helps until the scans do.
+
+    places : of anchors that ranges are measured to; None, or estimated ones, = ranges are not used.
 
     Raises
     ------
@@ -135,7 +146,8 @@ def build(
         quiet_gain=c.quiet_exponent / c.exponent,
         moving_gain=c.moving_gain,
     )
-    return _tracker(site, replace(c, summary=_scaled(c.summary, survey)), radio, start, lag)
+    config = replace(c, summary=_scaled(c.summary, survey))
+    return _tracker(site, config, radio, start, lag, None if places is None else _ranging(site, places, c))
 
 
 def build_from_start(
@@ -145,8 +157,39 @@ def build_from_start(
     return _tracker(site, config or Config(), None, start, lag)
 
 
+def build_from_ranges(
+    site: Site, places: ApPlaces, config: Config | None = None, *, lag: float = 0.0
+) -> Tracker[ParticleState]:
+    """The tracker without a radio map: steps and ranges to anchors, from anywhere in the building.
+
+    Raises
+    ------
+    UsageError : the places were estimated from a survey.
+    """
+    c = config or Config()
+    ranging = _ranging(site, places, c)
+    if ranging is None:
+        raise UsageError(
+            "ranges need measured places", where="--access-points", remedy="measure where the anchors hang"
+        )
+    return _tracker(site, c, None, None, lag, ranging)
+
+
+def _ranging(site: Site, places: ApPlaces, c: Config) -> AnchoredRanges | None:
+    if places.is_estimated:  # to some metres: worse than the ranges
+        return None
+    return AnchoredRanges.build(
+        site, places, sigma=c.range_sigma, late=c.range_late, lateness=c.range_lateness, gain=c.range_gain
+    )
+
+
 def _tracker(
-    site: Site, c: Config, radio: Radio | None, start: Start | None, lag: float
+    site: Site,
+    c: Config,
+    radio: Radio | None,
+    start: Start | None,
+    lag: float,
+    ranging: AnchoredRanges | None = None,
 ) -> Tracker[ParticleState]:
     motion = PdrMotion(
         length_sigma=c.length_sigma,
@@ -172,6 +215,8 @@ def _tracker(
     engine = ParticleEngine(
         n_floors=len(site.floors),
         radio=radio,
+        ranging=ranging,
+        anywhere=_anywhere(site, c) if ranging is not None and radio is None else None,
         start=known,
         prior=prior_estimate(site),
         motion=motion,
@@ -188,6 +233,11 @@ def _tracker(
     )
     vertical = VerticalFrontEnd(VerticalConfig(use_pressure=c.use_pressure))
     return Tracker(engine=engine, vertical=vertical, lag=lag)
+
+
+def _anywhere(site: Site, c: Config) -> Anywhere:
+    walkable = tuple(floor.walkable for floor in site.floors)
+    return Anywhere(walkable=walkable, bias_sigma=c.first_bias_sigma, scale_sigma=c.first_scale_sigma)
 
 
 def _walkable(site: Site, c: Config) -> tuple[Walkable, ...]:

@@ -1,19 +1,28 @@
-"""The methods by name: one place that says what ``--method NAME`` and a row of docs/results.md mean."""
+"""Trackers by the name of their method: what ``--method NAME`` and a row of docs/results.md mean.
+
+`presets.catalogue` says in words what each is and needs.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
+from importlib import import_module
 from types import MappingProxyType
-from typing import Any
+from typing import Any, TypeVar
 
+from wayfuse.core.errors import UsageError
 from wayfuse.maps.site import Site
 from wayfuse.presets import baselines, fused
+from wayfuse.presets.catalogue import PAPERS
+from wayfuse.radio.ap_places import ApPlaces
 from wayfuse.radio.survey import Survey
 from wayfuse.tracking.dead_reckoning import Start
 from wayfuse.tracking.tracker import Tracker
 
 __all__ = ["CONFIGS", "FIXES", "build_from_start", "build_method"]
+
+T = TypeVar("T")
 
 # the particle filters that need a survey; those that need a start instead are built by `build_from_start`
 CONFIGS: Mapping[str, fused.Config] = MappingProxyType(
@@ -33,12 +42,36 @@ FIXES = MappingProxyType({"wknn": baselines.wknn, "nnss": baselines.nnss})
 
 
 def build_method(
-    name: str, site: Site, survey: Survey, *, n_particles: int = 1000, lag: float = 0.0
+    name: str,
+    site: Site,
+    survey: Survey | None,
+    *,
+    places: ApPlaces | None = None,
+    start: Start | None = None,
+    n_particles: int | None = None,
+    lag: float = 0.0,
 ) -> Tracker[Any]:
-    """The tracker of a method of `CONFIGS` or `FIXES`; KeyError for another name."""
+    """The tracker of a method that needs no start; KeyError for another name.
+
+    places : of the access points; systems that need them estimate them from the survey where None are given.
+    start : helps until the radio does. n_particles : None = the method's own number.
+
+    Raises
+    ------
+    UsageError : something that the method needs is missing.
+    """
+    if name in PAPERS:
+        return _build_paper(name, site, survey, places, start, n_particles, lag)
+    if name == "fused-ranges":
+        config = fused.Config() if n_particles is None else fused.Config(n_particles=n_particles)
+        return fused.build_from_ranges(site, _given(name, places, "--access-points"), config, lag=lag)
+    given = _given(name, survey, "--radio-map")
     if name in FIXES:
-        return FIXES[name](site, survey, lag=lag)
-    return fused.build(site, survey, replace(CONFIGS[name], n_particles=n_particles), lag=lag)
+        return FIXES[name](site, given, lag=lag)
+    config = CONFIGS[name]
+    if n_particles is not None:
+        config = replace(config, n_particles=n_particles)
+    return fused.build(site, given, config, places=places, lag=lag)
 
 
 def build_from_start(
@@ -50,3 +83,27 @@ def build_from_start(
     if name != "fused-no-wifi":
         raise KeyError(name)
     return fused.build_from_start(site, start, fused.Config(n_particles=n_particles), lag=lag)
+
+
+def _build_paper(
+    name: str,
+    site: Site,
+    survey: Survey | None,
+    places: ApPlaces | None,
+    start: Start | None,
+    n_particles: int | None,
+    lag: float,
+) -> Tracker[Any]:
+    """A published system: presets/<name>.py has its numbers, presets/<name>_tracker.py puts it together."""
+    config = import_module(f"wayfuse.presets.{name}").Config()
+    if n_particles is not None:
+        config = replace(config, n_particles=n_particles)
+    build = import_module(f"wayfuse.presets.{name}_tracker").build
+    tracker: Tracker[Any] = build(site, survey, places=places, start=start, config=config, lag=lag)
+    return tracker
+
+
+def _given(name: str, what: T | None, option: str) -> T:
+    if what is None:
+        raise UsageError(f"method {name} lacks an input", where=option, remedy="give it")
+    return what

@@ -1,0 +1,110 @@
+r"""Ranges to anchors whose places are known, at particles on any floor: Gaussian about the distance, with a late tail.
+
+.. math:: p(d \mid x) = \prod_j \Big[(1 - \epsilon) \mathcal{N}(d_j; r_j, \sigma_j^2)
+   + \epsilon \frac{1}{\mu} e^{-(d_j - r_j) / \mu} [d_j > r_j]\Big]^{\gamma m_j}
+
+r_j is the distance in space from the anchor to the phone at particle x. A wall or a body between delays the signal and
+never hastens it: the tail is one-sided. With :math:`\epsilon = 0` and :math:`\gamma = 1` this is Eq. 10-12 of li2015
+[1]_, whose exponents m_j are those of `models.observation.ranges`.
+
+References
+----------
+.. [1] Li, Burbano, Zhao, Carrera, Braun, Fine-grained Indoor Tracking by Fusing Inertial Sensor and Physical Layer
+   Information in WLANs, University of Bern, INF-15-004, 2015.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from wayfuse.core.errors import ConfigError
+from wayfuse.core.types import Array
+from wayfuse.filters.cloud import Cloud
+from wayfuse.maps.site import Site
+from wayfuse.models.observation.ranges import Exponents, range_exponents
+from wayfuse.radio.ap_places import ApPlaces
+from wayfuse.sensors.records import Range
+
+__all__ = ["AnchoredRanges"]
+
+_FLOOR = (
+    1e-9  # 1/m, density of a range that nothing explains: no particle ever has none, where there is a tail
+)
+_ROOT_TAU = 2.5066282746310002
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class AnchoredRanges:
+    """Likelihood of the ranges of one moment, for a `Cloud`.
+
+    Parameters
+    ----------
+    places : of the anchors. offsets : (n_floors, 2) m, a place on floor k plus ``offsets[k]`` is in the frame of the
+    first. elevations : (n_floors,) m. sigma : m, standard deviation of a range without a wall between; where a record
+    states its own, the two add up in squares. late : epsilon, share of ranges that come late. lateness : mu, m.
+    exponents : how ranges are weighed against each other. gain : gamma, tempering, for the errors of ranges of one
+    place are alike from moment to moment. phone_height : m above the floor.
+    """
+
+    places: ApPlaces
+    offsets: Array
+    elevations: Array
+    sigma: float = 1.0
+    late: float = 0.0
+    lateness: float = 3.0
+    exponents: Exponents = Exponents.ONE
+    gain: float = 1.0
+    phone_height: float = 1.2
+
+    def __post_init__(self) -> None:
+        if not (self.sigma > 0.0 and self.lateness > 0.0 and self.gain > 0.0 and 0.0 <= self.late < 1.0):
+            raise ConfigError(
+                "sigma, lateness and gain must be positive, late a share below 1", where="AnchoredRanges"
+            )
+        if len(self.offsets) != len(self.elevations):
+            raise ConfigError("offsets and elevations of different floors", where="AnchoredRanges")
+        if len(self.places) and int(self.places.floor.max()) >= len(self.elevations):
+            raise ConfigError("an anchor is on a floor that the site does not have", where="AnchoredRanges")
+
+    @classmethod
+    def build(cls, site: Site, places: ApPlaces, **parameters: float | Exponents) -> AnchoredRanges:
+        """For the floors of a site; ``parameters`` as of the class."""
+        offsets = np.array([site.shift(k, 0) for k in range(len(site.floors))])
+        elevations = np.array([floor.elevation for floor in site.floors])
+        return cls(places=places, offsets=offsets, elevations=elevations, **parameters)  # type: ignore[arg-type]
+
+    def log_likelihood(self, cloud: Cloud, ranges: Sequence[Range], out: Array) -> bool:
+        """Add log p(d | x) to ``out`` (N,); False, and nothing added, where no anchor is known."""
+        rows = self.places.rows(np.array([r.anchor for r in ranges], np.uint64))
+        known = [(r, int(row)) for r, row in zip(ranges, rows, strict=True) if row >= 0]
+        if not known:
+            return False
+        m = range_exponents(np.array([r.distance for r, _ in known]), self.exponents)
+        x = cloud.x + self.offsets[cloud.floor, 0]
+        y = cloud.y + self.offsets[cloud.floor, 1]
+        z = self.elevations[cloud.floor] + self.phone_height
+        for (r, row), weight in zip(known, m, strict=True):
+            out += self.gain * weight * self._log_density(self._distance(row, x, y, z), r)
+        return True
+
+    def _distance(self, row: int, x: Array, y: Array, z: Array) -> Array:
+        """(N,) m in space from an anchor; one of unknown height is level with a phone on its floor."""
+        floor, height = int(self.places.floor[row]), float(self.places.height[row])
+        dx = x - (self.places.x[row] + self.offsets[floor, 0])
+        dy = y - (self.places.y[row] + self.offsets[floor, 1])
+        dz = z - (self.elevations[floor] + (height if np.isfinite(height) else self.phone_height))
+        return np.asarray(np.sqrt(dx * dx + dy * dy + dz * dz))
+
+    def _log_density(self, distance: Array, r: Range) -> Array:
+        """(N,) log density of a range at distances (N,) m, up to a constant of the range where there is no tail."""
+        sigma = float(np.hypot(self.sigma, r.sigma)) if np.isfinite(r.sigma) else self.sigma
+        excess = r.distance - distance
+        on_time = -0.5 * (excess / sigma) ** 2
+        if self.late == 0.0:
+            return np.asarray(on_time)
+        tail = np.where(excess > 0.0, np.exp(-np.maximum(excess, 0.0) / self.lateness) / self.lateness, 0.0)
+        density = (1.0 - self.late) / (_ROOT_TAU * sigma) * np.exp(on_time) + self.late * tail
+        return np.asarray(np.log(np.maximum(density, _FLOOR)))
