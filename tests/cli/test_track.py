@@ -12,7 +12,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from wayfuse.cli.track import METHODS
+from wayfuse.presets.catalogue import METHODS
+from wayfuse.radio.ap_places import ApPlaces, write_ap_places
 
 Run = Callable[..., Any]
 
@@ -35,6 +36,38 @@ def rows(path: Path) -> list[dict[str, str]]:
 
 def walk_paths(world: Any) -> list[Path]:
     return sorted((world.folder / "walks").rglob("*.txt"))
+
+
+def places_file(world: Any, folder: Path) -> Path:
+    """Places for some access points of the world, as a surveyor might have written them down."""
+    n = 12
+    rng = np.random.default_rng(1)
+    places = ApPlaces(
+        world.survey.bssid[:n],
+        rng.uniform(5.0, 60.0, n),
+        rng.uniform(5.0, 40.0, n),
+        np.zeros(n, np.int32),
+        np.full(n, np.nan),
+    )
+    write_ap_places(folder / "aps.csv", places, world.site.floor_names)
+    return folder / "aps.csv"
+
+
+def test_what_a_published_system_needs_is_said(world: Any, run_cli: Run, tmp_path: Path) -> None:
+    path, out = walk_paths(world)[0], tmp_path / "EST.csv"
+    for method, option in (
+        ("chu2009", "--radio-map"),
+        ("liu2017", "--access-points"),
+        ("li2015", "--access-points"),
+    ):
+        said = run_cli("track", world.folder / "SITE", path, "--method", method, "--out", out)
+        assert said.code == 2
+        assert option in said.err
+        assert method in said.err
+    only_map = ("--radio-map", world.folder / "map.npz")
+    said = run_cli("track", world.folder / "SITE", path, "--method", "fused-ranges", "--out", out, *only_map)
+    assert said.code == 2
+    assert "--access-points" in said.err
 
 
 def test_the_way_from_plans_to_scores(world: Any, run_cli: Run, tmp_path: Path) -> None:
@@ -118,8 +151,10 @@ def test_a_walk_does_not_depend_on_the_others_nor_on_its_truth(
 def test_all_methods_in_one_file(world: Any, track: Run, tmp_path: Path) -> None:
     path = walk_paths(world)[0]
     chosen = [a for name in METHODS for a in ("--method", name)]
-    said = track(path, *chosen, "--start", "waypoint")
+    said = track(path, *chosen, "--start", "waypoint", "--access-points", places_file(world, tmp_path))
     assert said.code == 0, said.err
+    assert "no range to an anchor: li2015 knows no position" in said.err
+    assert "li2015 does not use: Wi-Fi scan" in said.err
     found = rows(tmp_path / "EST.csv")
     assert {r["method"] for r in found} == set(METHODS)
     again = track(path, "--method", "wknn", "--method", "wknn")

@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from wayfuse.cli.track import FROM_START, METHODS
 from wayfuse.core.errors import ConfigError, RadioMapError
 from wayfuse.models.constraint.barriers import Barriers
 from wayfuse.models.constraint.walkable_mask import WalkableMask
 from wayfuse.presets import baselines
+from wayfuse.presets.catalogue import METHODS, PAPERS
 from wayfuse.presets.fused import BAND_2_4, BAND_5, Config, build, check_floors, prior_estimate
 from wayfuse.presets.methods import CONFIGS, FIXES, build_method
 from wayfuse.radio.survey import Fingerprint
@@ -77,7 +77,9 @@ def test_parts_can_be_left_out(world: Any) -> None:
 
 
 def test_every_method_of_the_command_line_can_be_built() -> None:
-    assert set(METHODS) - set(FROM_START) <= {*CONFIGS, *FIXES}
+    from_start = {name for name, method in METHODS.items() if "start" in method.needs}
+    assert set(METHODS) - from_start - {"fused-ranges"} <= {*CONFIGS, *FIXES, *PAPERS}
+    assert set(PAPERS) < set(METHODS)
 
 
 def test_one_band_uses_that_band_alone(world: Any) -> None:
