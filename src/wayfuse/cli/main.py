@@ -24,6 +24,10 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "evaluate": ("wayfuse.cli.evaluate:evaluate", "Score estimates against the waypoints of recordings."),
     "datasets": ("wayfuse.cli.datasets:datasets", "List, fetch and verify public data sets."),
     "inspect": ("wayfuse.cli.inspect:inspect", "Say what a recording holds and what was wrong with it."),
+    "simulate": (
+        "wayfuse.cli.simulate:simulate",
+        "Simulate walks of a scenario, with the truth beside them.",
+    ),
     "demo": ("wayfuse.cli.demo:demo", "Run the whole pipeline on a simulated site."),
     "reproduce": (
         "wayfuse.cli.reproduce:reproduce",

@@ -49,6 +49,7 @@ class ImuModel:
     roll: float = 0.06  # rad, mean; measured mean a_x -0.6
     roll_sigma: float = 0.02  # rad, between walks
     tilt_drift: float = 0.03  # rad, slow, within a walk
+    hold: float = 0.0  # rad, heading of the phone against the body, mean: 0 its top along the walk
     hold_sigma: float = 0.1  # rad, heading of the phone against the body, between walks
     hold_drift: float = 0.07  # rad, the same, slow, within a walk
     drift_time: float = 8.0  # s, of the slow drifts
@@ -171,6 +172,7 @@ def _orientation(
         + model.tilt_drift * drifts[2]
         + swing * model.roll_sway * np.sin(0.5 * phase + lag[2])
     )
+    yaw = yaw + model.hold
     return multiply(about_axis(2, yaw), multiply(about_axis(0, pitch), about_axis(1, roll)))
 
 

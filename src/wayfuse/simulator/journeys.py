@@ -19,7 +19,17 @@ from wayfuse.simulator.rides import LiftModel
 from wayfuse.simulator.routes import beside, plan_route
 from wayfuse.simulator.travel import Leg
 
-__all__ = ["Journey", "Trip", "draw_trips", "plan_journey", "stay"]
+__all__ = [
+    "Journey",
+    "Trip",
+    "draw_trips",
+    "landing_node",
+    "plan_journey",
+    "shortest",
+    "stay",
+    "through",
+    "trips_from",
+]
 
 _TURN_BACK = 15.0  # m more or less than wanted are better than to turn on the spot
 _NEAR = 0.5  # m, a node this near to a landing is the landing's
@@ -42,23 +52,42 @@ class Journey:
 
 
 def draw_trips(
-    building: Building, n: int, rng: np.random.Generator, *, lift_first: bool = False
+    building: Building,
+    n: int,
+    rng: np.random.Generator,
+    *,
+    lift_first: bool = False,
+    connectors: str = "both",
 ) -> tuple[int, list[Trip]]:
-    """A start floor and ``n`` changes of floors, by lift and by stairs in turn."""
+    """A start floor and ``n`` changes of floors, fewer where no way leads on.
+
+    Parameters
+    ----------
+    connectors : ``stairs`` (and escalators), ``lift``, or ``both`` in turn, where the floor has both.
+    """
     floor = start = int(rng.integers(len(building.storeys)))
     trips: list[Trip] = []
     for k in range(n):
-        by_lift = (k % 2 == 0) == lift_first
-        choices = [
-            Trip(index, other)
-            for index, passage in enumerate(building.passages)
-            if passage.is_lift == by_lift and floor in passage.connector.floors
-            for other in passage.connector.floors
-            if other != floor and (by_lift or _leads(passage, floor, other))
-        ]
+        by_lift = (k % 2 == 0) == lift_first if connectors == "both" else connectors == "lift"
+        choices = trips_from(building, floor, by_lift=by_lift)
+        if not choices and connectors == "both":
+            choices = trips_from(building, floor, by_lift=not by_lift)
+        if not choices:
+            break
         trips.append(choices[int(rng.integers(len(choices)))])
         floor = trips[-1].floor
     return start, trips
+
+
+def trips_from(building: Building, floor: int, *, by_lift: bool) -> list[Trip]:
+    """The changes of floor that a lift, or stairs and escalators, allow from a floor."""
+    return [
+        Trip(index, other)
+        for index, passage in enumerate(building.passages)
+        if passage.is_lift == by_lift and floor in passage.connector.floors
+        for other in passage.connector.floors
+        if other != floor and (by_lift or _leads(passage, floor, other))
+    ]
 
 
 def _leads(passage: Passage, a: int, b: int) -> bool:
@@ -96,20 +125,21 @@ def plan_journey(
     floor = start
     for trip in [*trips, None]:
         passage = None if trip is None else building.passages[trip.passage]
-        goal = None if passage is None else _landing_node(building, floor, passage)
+        goal = None if passage is None else landing_node(building, floor, passage)
         ways = _wander(building, floor, node, goal, visit, rng)
         legs += _level_legs(building.storeys[floor], floor, ways, place, wander, passage is not None, rng)
         _pause(legs, len(ways) - 1, pause_share, pause_range, rng)
         if trip is None or passage is None:
             break
-        legs += _through(passage, trip, floor, legs, lifts, rng)
+        legs += through(passage, trip, floor, legs, lifts, rng)
         floor = trip.floor
-        node = _landing_node(building, floor, passage)
+        node = landing_node(building, floor, passage)
         place = np.array(legs[-1].stretch[:2])
     return Journey(origin, tuple(legs))
 
 
-def _landing_node(building: Building, floor: int, passage: Passage) -> int:
+def landing_node(building: Building, floor: int, passage: Passage) -> int:
+    """The node of a floor that is a passage's landing."""
     landing = passage.connector.landing(floor)
     if landing is None:
         raise ValueError(f"{passage.connector.id} does not stop on floor {floor}")
@@ -143,8 +173,8 @@ def _wander(
     least = np.inf
     for _ in range(24):
         middle = int(rng.choice(inner))
-        first = _shortest(storey, node, middle)
-        second = [] if goal is None else _shortest(storey, middle, goal)
+        first = shortest(storey, node, middle)
+        second = [] if goal is None else shortest(storey, middle, goal)
         turns_back = bool(first and second) and second[0] == [node, *first][-2]
         length = _length(storey, [node, *first, *second])
         off = max(visit[0] - length, length - visit[1], 0.0) + _TURN_BACK * turns_back
@@ -162,7 +192,7 @@ def _length(storey: Storey, nodes: list[int]) -> float:
     return float(np.hypot(*np.diff(storey.nodes[nodes], axis=0).T).sum())
 
 
-def _shortest(storey: Storey, start: int, goal: int) -> list[int]:
+def shortest(storey: Storey, start: int, goal: int) -> list[int]:
     """Nodes of the shortest way, the start left out."""
     around: dict[int, list[tuple[int, float]]] = {}
     lengths = np.hypot(*(storey.nodes[storey.edges[:, 1]] - storey.nodes[storey.edges[:, 0]]).T)
@@ -209,7 +239,7 @@ def _pause(
             legs[k] = legs[k]._replace(pause=float(rng.uniform(*span)), left=legs[k].stated)
 
 
-def _through(
+def through(
     passage: Passage, trip: Trip, floor: int, legs: list[Leg], lifts: LiftModel, rng: np.random.Generator
 ) -> list[Leg]:
     """Legs from landing to landing."""

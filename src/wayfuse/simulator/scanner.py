@@ -11,11 +11,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from wayfuse.core.types import Array, IntArray
+from wayfuse.core.types import Array, BoolArray, IntArray
 from wayfuse.simulator.radio_field import RadioField
+from wayfuse.simulator.toml_tables import no_negative, require
 from wayfuse.simulator.walker import Walk
 
-__all__ = ["ScannerModel", "Sweep", "between_floors", "scan"]
+__all__ = ["ScannerModel", "Sweep", "between_floors", "level_at", "scan"]
 
 _NO_SHARE = 1e-9  # of a storey in what is heard: less is rounding
 
@@ -43,6 +44,17 @@ class ScannerModel:
     twin_db: float = 0.7  # per reading: networks of one radio
     body_db: float = 7.0  # behind the walker's back
     device_offset_db: tuple[float, float] = (0.0, 0.0)  # of this phone's receiver, at 2.4 and 5 GHz
+    throttle_scans: int = 0  # most scans in throttle_s; Android grants an app in front 4; 0: no limit
+    throttle_s: float = 120.0
+    missed_share: float = 0.0  # of the scans asked for: nothing is heard, nothing is delivered
+    stale_repeats: bool = False  # a scan refused or missed delivers the last list again
+
+    def __post_init__(self) -> None:
+        no_negative(self, but=("sensitivity_dbm", "weakest_dbm", "device_offset_db"))
+        require("period_s", self.period_s > 0.0, self.period_s, "must be positive")
+        require("softness_db", self.softness_db > 0.0, self.softness_db, "must be positive")
+        shares = self.hit_rate, self.missed_share
+        require("hit_rate, missed_share", max(shares) <= 1.0, shares, "from 0 to 1")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -71,6 +83,7 @@ def scan(
     loss : (n, 2) dB at 2.4 and 5 GHz on the walk's grid, where something is about the phone: a lift's cabin.
     """
     delivered = _delivery_times(walk.duration, model, rng)
+    granted = _granted(delivered, model, rng)
     n_radios, n_sweeps = radios.n_radios, len(delivered)
     order = np.argsort(np.argsort(radios.frequency, kind="stable")) / max(1, n_radios - 1)
     heard_at = delivered[:, None] - model.latency_s - model.sweep_s * (1.0 - order)  # (sweeps, radios)
@@ -86,7 +99,7 @@ def scan(
     rssi = np.round(level[:, radios.radio] + rng.normal(0.0, model.twin_db, (n_sweeps, n)))
     edge = (rssi - model.sensitivity_dbm) / model.softness_db
     heard = rng.random((n_sweeps, n)) < model.hit_rate / (1.0 + np.exp(-edge))
-    heard &= rssi >= model.weakest_dbm
+    heard &= (rssi >= model.weakest_dbm) & granted[:, None]
     times = heard_at[:, radios.radio]
 
     last_seen, last_rssi = np.full(n, -np.inf), np.zeros(n)
@@ -95,7 +108,8 @@ def scan(
         last_seen = np.where(heard[k], times[k], last_seen)
         last_rssi = np.where(heard[k], rssi[k], last_rssi)
         listed = np.flatnonzero(t - last_seen <= model.memory_s)
-        if 0.0 <= t <= walk.duration and len(listed):
+        is_delivered = bool(granted[k]) or model.stale_repeats
+        if is_delivered and 0.0 <= t <= walk.duration and len(listed):
             listed = listed[np.argsort(-last_rssi[listed], kind="stable")]
             sweeps.append(Sweep(t, listed, last_rssi[listed], last_seen[listed]))
     return tuple(sweeps)
@@ -108,6 +122,21 @@ def _delivery_times(duration: float, model: ScannerModel, rng: np.random.Generat
     return np.asarray(t[t <= duration])
 
 
+def _granted(t: Array, model: ScannerModel, rng: np.random.Generator) -> BoolArray:
+    """Which of the scans asked for at times t (n,) s take place: those missed and those refused do not."""
+    granted = np.ones(len(t), dtype=bool)
+    if model.missed_share:
+        granted &= rng.random(len(t)) >= model.missed_share
+    if model.throttle_scans:
+        scans: list[float] = []
+        for k in np.flatnonzero(granted).tolist():
+            if len(scans) >= model.throttle_scans and t[k] - scans[-model.throttle_scans] < model.throttle_s:
+                granted[k] = False
+            else:
+                scans.append(float(t[k]))
+    return granted
+
+
 def _levels(walk: Walk, floor: int, radios: RadioField, heard_at: Array, model: ScannerModel) -> Array:
     """RSSI (sweeps, radios) dBm at the places and headings of the moments each radio is heard."""
     shape = heard_at.shape
@@ -115,17 +144,23 @@ def _levels(walk: Walk, floor: int, radios: RadioField, heard_at: Array, model: 
     xy = np.column_stack([np.interp(flat, walk.t, walk.xy[:, k]) for k in (0, 1)])
     heading = np.interp(flat, walk.t, walk.heading)
     radio = np.tile(np.arange(shape[1]), shape[0])
-    if walk.climb is None:
-        level = radios.rssi(radio, xy, floor)
-    else:
-        level = between_floors(radios, radio, xy, np.interp(flat, walk.t, walk.climb.z))
+    level = level_at(walk, radios, radio, xy, flat, floor)
     away = radios.ap_xy[radios.ap[radio]] - xy
     ahead = np.cos(np.arctan2(away[:, 1], away[:, 0]) - heading)
     return np.asarray((level - 0.5 * model.body_db * (1.0 - ahead)).reshape(shape))
 
 
+def level_at(walk: Walk, radios: RadioField, radio: IntArray, xy: Array, t: Array, floor: int = 0) -> Array:
+    """Mean RSSI (m,) dBm of radios (m,) at places (m, 2) m and times (m,) s of a walk; ``floor`` of one on a floor."""
+    if walk.climb is None:
+        return radios.rssi(radio, xy, floor)
+    return between_floors(radios, radio, xy, np.interp(t, walk.t, walk.climb.z))
+
+
 def between_floors(radios: RadioField, radio: IntArray, xy: Array, z: Array) -> Array:
     """RSSI (m,) dBm at heights z (m,) m: between two storeys it goes over from one's to the other's in dB."""
+    if len(radios.storeys) == 1:
+        return radios.rssi(radio, xy, 0)
     elevation = np.array([storey.elevation for storey in radios.storeys])
     lower = np.clip(np.searchsorted(elevation, z, side="right") - 1, 0, len(elevation) - 2)
     share = np.clip((z - elevation[lower]) / (elevation[lower + 1] - elevation[lower]), 0.0, 1.0)
