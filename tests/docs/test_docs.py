@@ -58,8 +58,8 @@ def test_the_page_documents_no_command_that_is_not_there() -> None:
 def test_options_are_read_from_the_commands() -> None:
     section = cli_docs.section("track")
     assert (
-        "| `--radio-map PATH` | From `wayfuse survey build`; only fused-no-wifi and pdr do without. |"
-        in section
+        "| `--radio-map PATH` | From `wayfuse survey build`; methods that begin at a start or go by places of access "
+        "points do without. |" in section
     )
     assert "### wayfuse datasets fetch" in cli_docs.section("datasets")
 
