@@ -19,6 +19,7 @@ import math
 import re
 from collections.abc import Iterator
 from pathlib import Path
+from typing import BinaryIO
 
 from wayfuse.core.errors import FormatError
 from wayfuse.formats.assembly import assemble
@@ -27,7 +28,7 @@ from wayfuse.sensors.quality import ReadReport
 from wayfuse.sensors.recording import Device, Recording
 from wayfuse.sensors.records import Waypoint, bssid_id
 
-__all__ = ["KINDS", "blocks", "read"]
+__all__ = ["KINDS", "blocks", "read", "read_stream"]
 
 BLOCK_BYTES = 1 << 20
 _SERIES = {  # kind: column, index of the first value, count of values, fields without the accuracy at the end
@@ -52,23 +53,30 @@ def read(path: str | Path) -> Recording:
     FormatError : the file is empty or holds neither the header nor a record of this format.
     """
     path = Path(path)
-    report = ReadReport(path=str(path))
-    pieces = list(blocks(path, report=report))
+    with path.open("rb") as file:
+        return read_stream(file, name=path.stem, path=str(path))
+
+
+def read_stream(file: BinaryIO, *, name: str, path: str = "") -> Recording:
+    """Read a whole log from an open file, or from bytes that came over the network (`io.BytesIO`).
+
+    Raises
+    ------
+    FormatError : it is empty or holds neither the header nor a record of this format.
+    """
+    report = ReadReport(path=path)
+    pieces = list(_blocks(file, BLOCK_BYTES, report))
     header: dict[str, str] = {}
     for piece in pieces:
         header |= piece.header
     if not header and not report.n_records:
-        what = (
-            "the file is empty"
-            if path.stat().st_size == 0
-            else "neither a header nor a record of GetSensorData"
-        )
+        what = "neither a header nor a record of GetSensorData" if report.n_lines else "the file is empty"
         raise FormatError(what, where=path, remedy="give --format, or leave the file out")
     release = header.get("release", "")
     return assemble(
         pieces,
         report,
-        name=path.stem,
+        name=name,
         clock="AppTimestamp",
         device=Device(
             header.get("brand", ""), header.get("model", ""), f"Android {release}" if release else ""
@@ -83,12 +91,16 @@ def blocks(
     """Pieces of a log in file order, about ``block_bytes`` at a time; last seen is still the sensor's."""
     report = ReadReport(path=str(path)) if report is None else report
     with Path(path).open("rb") as file:
-        while lines := file.readlines(block_bytes):
-            reader = _Lines(report)
-            for line in lines:
-                report.n_lines += 1
-                reader.line(line, report.n_lines)
-            yield Piece(reader.rows.columns(), reader.rows.waypoints, reader.header)
+        yield from _blocks(file, block_bytes, report)
+
+
+def _blocks(file: BinaryIO, block_bytes: int, report: ReadReport) -> Iterator[Piece]:
+    while lines := file.readlines(block_bytes):
+        reader = _Lines(report)
+        for line in lines:
+            report.n_lines += 1
+            reader.line(line, report.n_lines)
+        yield Piece(reader.rows.columns(), reader.rows.waypoints, reader.header)
 
 
 class _Lines:

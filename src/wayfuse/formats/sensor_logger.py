@@ -33,7 +33,7 @@ from wayfuse.sensors.quality import ReadReport
 from wayfuse.sensors.recording import Device, Recording
 from wayfuse.sensors.records import bssid_id
 
-__all__ = ["PLATFORMS", "blocks", "read"]
+__all__ = ["PLATFORMS", "blocks", "read", "recording_of"]
 
 PLATFORMS = ("android", "ios")
 SCAN_GAP_S = 0.5  # rows of one scan come within milliseconds, scans every few seconds
@@ -87,17 +87,33 @@ def read(path: str | Path, *, platform: str | None = None) -> Recording:
     for piece in pieces:
         metadata |= piece.header
     profile = _profile(metadata, platform, path)
-    columns = _join(pieces)
-    _physical(columns, profile, report)
     system = f"{profile.platform} {metadata.get('platform version', '')}".strip()
-    return assemble(
-        [Piece(columns)],
+    return recording_of(
+        _join(pieces),
         report,
+        platform=profile.platform,
+        standardised=profile.standardised,
         name=path.stem if path.is_file() else path.name,
-        clock="Unix time",
         device=Device("", metadata.get("device name", ""), system),
-        one_stream=False,
     )
+
+
+def recording_of(
+    columns: Mapping[str, Column],
+    report: ReadReport,
+    *,
+    platform: str,
+    standardised: bool,
+    name: str,
+    device: Device | None = None,
+) -> Recording:
+    """The records of columns in the app's own conventions (kinds of `blocks`), also of a part of a recording.
+
+    platform, standardised : whose conventions, and whether the app converted to those of Android.
+    """
+    columns = dict(columns)
+    _physical(columns, _Profile(platform, standardised), report)
+    return assemble([Piece(columns)], report, name=name, clock="Unix time", device=device, one_stream=False)
 
 
 def blocks(path: str | Path, *, report: ReadReport | None = None) -> Iterator[Piece]:

@@ -121,6 +121,8 @@ def _save(connection: Connection, seq: int, kept: Checkpoint) -> None:
         connection.execute(
             update(checkpoints).where(checkpoints.c.track == name).values(seq=seq, state=kept.state)
         )
+    if kept.first == 0:  # begun anew: a checkpoint of another version could not be gone on from
+        connection.execute(delete(estimates).where(estimates.c.track == name))
     if kept.settled:
         rows = [
             {"track": name, "n": n, **e._asdict(), "state": e.state.value}

@@ -1,0 +1,203 @@
+"""All live tracks: entries of the log in, changes out. What it does depends on the entries alone, in their order."""
+
+from __future__ import annotations
+
+import json
+import logging
+import threading
+from collections import Counter
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from wayfuse.core.errors import FormatError
+from wayfuse.service.adapters import ADAPTERS
+from wayfuse.service.checkpoint import pack, unpack
+from wayfuse.service.live_track import LiveConfig, LiveTrack, Memory
+from wayfuse.service.message import BadBodyError, Message, Profile
+from wayfuse.service.world import World
+from wayfuse.storage.log import Entry
+from wayfuse.storage.tracks import Checkpoint, TrackRow
+from wayfuse.tracking.estimate import Estimate
+
+__all__ = ["Applied", "Live", "View", "profile_json", "read_entry"]
+
+_log = logging.getLogger(__name__)
+Recall = Callable[[str], tuple[TrackRow, bytes] | None]
+
+
+class View(NamedTuple):
+    """A track as it is now. number : of the estimate. ahead : s, of the phone's clock before the server's."""
+
+    row: TrackRow
+    estimate: Estimate | None
+    number: int
+    ahead: float
+    counts: Mapping[str, int]
+    is_ended: bool
+
+
+class Applied(NamedTuple):
+    """What an entry changed: the track, and the number of the first estimate that is new or was revised."""
+
+    seq: int
+    view: View
+    changed: int
+
+
+def profile_json(profile: Profile, map_version: int) -> str:
+    """What the log keeps beside a body: no names, those are pseudonyms in their own columns."""
+    kept = {"platform": profile.platform, "standardised": profile.standardised, "map": map_version}
+    return json.dumps(kept, separators=(",", ":"))
+
+
+def read_entry(entry: Entry) -> Message:
+    """The message of an entry of the log.
+
+    Raises
+    ------
+    BadBodyError : this version of the package does not read what another one accepted.
+    """
+    said = json.loads(entry.profile)
+    profile = Profile("-", "-", said["platform"], said["standardised"])
+    messages = ADAPTERS[entry.adapter].read(entry.body, profile, entry.arrived)
+    if len(messages) != 1:
+        raise BadBodyError(f"{len(messages)} messages in an entry of the log")
+    return messages[0]
+
+
+@dataclass(slots=True)
+class _Held:
+    row: TrackRow
+    track: LiveTrack
+    is_dirty: bool = True
+
+
+class Live:
+    """The tracks of all sites. Its methods may be called from any thread.
+
+    Parameters
+    ----------
+    worlds : by name of the site. recall : gives a track's checkpoint, None where it has none. seed : of all tracks.
+    """
+
+    def __init__(
+        self, worlds: Mapping[str, World], recall: Recall, config: LiveConfig | None = None, seed: int = 0
+    ) -> None:
+        self.counts: Counter[str] = Counter()
+        self._worlds, self._recall = worlds, recall
+        self._config, self._seed = config or LiveConfig(), seed
+        self._held: dict[str, _Held] = {}
+        self._lock = threading.RLock()
+
+    def apply(self, entry: Entry, message: Message | None = None) -> Applied | None:
+        """Take an entry; None where it changed nothing. ``message`` : what the entry says, where it is at hand."""
+        if entry.site not in self._worlds or entry.adapter not in ADAPTERS:
+            self.counts["entries of no site or adapter"] += (
+                1  # of a site that is no longer served, or deleted
+            )
+            return None
+        try:
+            message = read_entry(entry) if message is None else message
+        except BadBodyError as error:
+            self.counts["entries that cannot be read"] += 1
+            _log.warning("entry %d of the log: %s", entry.seq, error)
+            return None
+        with self._lock:
+            held = self._of(entry)
+            held.row = held.row._replace(heard=entry.arrived)
+            held.is_dirty = True
+            try:
+                changed = held.track.apply(message, entry.arrived)
+            except Exception:  # whatever it is, it must not stop the other tracks
+                self.counts["entries that failed"] += 1
+                held.track.counts["messages that failed"] += 1
+                _log.exception("entry %d of the log failed", entry.seq)
+                return None
+            return Applied(entry.seq, self._view(held), changed)
+
+    def _of(self, entry: Entry) -> _Held:
+        """The track of an entry: in memory, from its checkpoint, or new."""
+        held = self._held.get(entry.track) or self._load(entry.track)
+        if held is None:
+            version = int(json.loads(entry.profile)["map"])
+            row = TrackRow(entry.track, entry.site, entry.device, version, entry.arrived, entry.arrived)
+            tracker = self._worlds[entry.site].tracker(version)
+            held = _Held(row, LiveTrack(tracker, entry.track, self._seed, self._config))
+            self._held[entry.track] = held
+        return held
+
+    def _load(self, track: str) -> _Held | None:
+        kept = self._recall(track)
+        if kept is None or kept[0].site not in self._worlds:
+            return None
+        row, state = kept
+        try:
+            memory = unpack(state)
+        except FormatError as error:
+            self.counts["checkpoints of another version"] += 1
+            _log.warning("track %s begins anew: %s", track, error)
+            return None
+        if not isinstance(memory, Memory):
+            raise FormatError("a checkpoint that is no memory of a track", where=track)
+        tracker = self._worlds[row.site].tracker(row.map_version)
+        held = _Held(row, LiveTrack.recall(tracker, memory, self._config), is_dirty=False)
+        self._held[track] = held
+        return held
+
+    def load(self, track: str) -> bool:
+        """Bring a track from its checkpoint into memory; whether there is such a track."""
+        with self._lock:
+            return track in self._held or self._load(track) is not None
+
+    def checkpoint(self) -> list[Checkpoint]:
+        """What changed since the last time, to be written together; it must be written, or the process must end."""
+        with self._lock:
+            out = []
+            for held in self._held.values():
+                if held.is_dirty:
+                    first, settled = held.track.drain()
+                    out.append(Checkpoint(held.row, first, settled, pack(held.track.memory())))
+                    held.is_dirty = False
+            return out
+
+    def release(self, before: float) -> int:
+        """Let go of tracks last heard before a time (Unix s) whose checkpoints are written; how many."""
+        with self._lock:
+            idle = [k for k, h in self._held.items() if not h.is_dirty and h.row.heard < before]
+            for track in idle:
+                del self._held[track]
+            return len(idle)
+
+    def forget(self, device: str) -> None:
+        """Drop the tracks of a device."""
+        with self._lock:
+            for track in [k for k, h in self._held.items() if h.row.device == device]:
+                del self._held[track]
+
+    # --- what comes out
+
+    def view(self, track: str) -> View | None:
+        """A track in memory."""
+        with self._lock:
+            held = self._held.get(track)
+            return None if held is None else self._view(held)
+
+    def views(self, site: str = "") -> list[View]:
+        """Tracks in memory, of a site or all, the last heard first."""
+        with self._lock:
+            all_of = [self._view(h) for h in self._held.values() if site in {"", h.row.site}]
+        return sorted(all_of, key=lambda v: (-v.row.heard, v.row.track))
+
+    def recent(self, track: str) -> tuple[int, list[Estimate]]:
+        """The estimates of a track that are not written yet, and the number of the first."""
+        with self._lock:
+            held = self._held.get(track)
+            return (0, []) if held is None else (held.track.first, held.track.undrained())
+
+    @staticmethod
+    def _view(held: _Held) -> View:
+        track = held.track
+        number = track.first + len(track.undrained()) - 1
+        counts = dict(track.counts) | track.verdicts
+        return View(held.row, track.latest, number, track.ahead, counts, track.is_ended)

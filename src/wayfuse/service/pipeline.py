@@ -1,0 +1,222 @@
+"""From accepted batches to tracks: one thread that writes the log and then feeds the tracks.
+
+Whatever waits is written as one group in one transaction, so that the price of a sync is shared; only then are the
+senders answered. After that the group goes into the tracks, in the order of the log. A checkpoint now and then keeps
+the part of the log short that must be read again after a crash.
+"""
+
+from __future__ import annotations
+
+import logging
+import threading
+from collections import deque
+from collections.abc import Callable, Sequence
+from concurrent.futures import Future
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from sqlalchemy.exc import SQLAlchemyError
+
+from wayfuse.core.errors import ConfigError, WayfuseError
+from wayfuse.service.live import Applied, Live
+from wayfuse.service.message import Message
+from wayfuse.storage.log import Entry, IngestLog
+from wayfuse.storage.tracks import Checkpoint, TrackStore
+
+__all__ = ["BusyError", "Item", "Pipeline", "PipelineConfig", "recover"]
+
+_log = logging.getLogger(__name__)
+
+
+class BusyError(WayfuseError):
+    """Too much is waiting; the sender should come again."""
+
+
+class Item(NamedTuple):
+    """A message and the entry it becomes; the pipeline gives the ``seq``."""
+
+    entry: Entry
+    message: Message
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PipelineConfig:
+    """max_waiting, max_waiting_bytes : what may wait to be written. group : most entries of one transaction.
+    checkpoint_every : s between checkpoints. idle : s until a silent track leaves the memory."""
+
+    max_waiting: int = 10_000
+    max_waiting_bytes: int = 256 << 20
+    group: int = 512
+    checkpoint_every: float = 10.0
+    idle: float = 900.0
+
+    def __post_init__(self) -> None:
+        if min(self.max_waiting, self.max_waiting_bytes, self.group) < 1 or not self.checkpoint_every > 0.0:
+            raise ConfigError("the limits of the pipeline must be positive", where="PipelineConfig")
+
+
+class _Waiting(NamedTuple):
+    items: Sequence[Item]
+    done: Future[list[int]]
+
+
+class Pipeline:
+    """The thread. ``clock`` gives Unix s; ``publish`` is called, in the thread, with what a group changed."""
+
+    def __init__(
+        self,
+        log: IngestLog,
+        live: Live,
+        tracks: TrackStore,
+        next_seq: int,
+        *,
+        clock: Callable[[], float],
+        publish: Callable[[list[Applied]], None],
+        config: PipelineConfig | None = None,
+    ) -> None:
+        self.applied = next_seq - 1  # seq of the last entry that is in the tracks
+        self.n_waiting = 0
+        self.is_broken = False
+        self._config = config or PipelineConfig()
+        self._log, self._live, self._tracks = log, live, tracks
+        self._clock, self._publish = clock, publish
+        self._next = next_seq
+        self._kept = self.applied  # seq of the last checkpoint
+        self._due = clock() + self._config.checkpoint_every
+        self._queue: deque[_Waiting] = deque()
+        self._bytes = 0
+        self._unsaved: list[Checkpoint] = []  # of rounds that could not be written
+        self._wake = threading.Condition()
+        self._stopping = False
+        self._thread = threading.Thread(target=self._run, name="wayfuse-pipeline", daemon=True)
+
+    def start(self) -> None:
+        """Begin to work."""
+        self._thread.start()
+
+    def stop(self) -> None:
+        """Do what waits, write a checkpoint, end."""
+        with self._wake:
+            self._stopping = True
+            self._wake.notify()
+        self._thread.join()
+
+    def submit(self, items: Sequence[Item]) -> Future[list[int]]:
+        """Hand over a batch; the future has the seqs when they are on the disk.
+
+        Raises
+        ------
+        BusyError : too much waits already, or the server is going down.
+        """
+        size = sum(len(item.entry.body) for item in items)
+        done: Future[list[int]] = Future()
+        with self._wake:
+            is_full = self.n_waiting + len(items) > self._config.max_waiting
+            if (
+                self._stopping
+                or is_full
+                or (self._bytes and self._bytes + size > self._config.max_waiting_bytes)
+            ):
+                raise BusyError("the server is busy", remedy="send it again in a moment")
+            self._queue.append(_Waiting(items, done))
+            self.n_waiting += len(items)
+            self._bytes += size
+            self._wake.notify()
+        return done
+
+    def _run(self) -> None:
+        try:
+            self._work()
+        except Exception:  # the thread cannot go on; nobody may be told that a batch was kept
+            _log.exception("the pipeline has stopped")
+            with self._wake:
+                self._stopping, self.is_broken = True, True
+                lost, self._queue = list(self._queue), deque()
+            for waiting in lost:
+                waiting.done.set_exception(BusyError("the server is broken", remedy="tell its operator"))
+
+    def _work(self) -> None:
+        while True:
+            group = self._take()
+            if group:
+                self._do(group)
+            is_over = self._is_over()
+            if self._kept < self.applied and (self._clock() >= self._due or is_over):
+                self._checkpoint()
+            if is_over:
+                return
+
+    def _is_over(self) -> bool:
+        with self._wake:
+            return self._stopping and not self._queue
+
+    def _take(self) -> list[_Waiting]:
+        with self._wake:
+            if not self._queue and not self._stopping:
+                self._wake.wait(min(1.0, self._config.checkpoint_every))
+            group: list[_Waiting] = []
+            n = 0
+            while self._queue and (not group or n + len(self._queue[0].items) <= self._config.group):
+                group.append(self._queue.popleft())
+                n += len(group[-1].items)
+            self.n_waiting -= n
+            self._bytes -= sum(len(i.entry.body) for w in group for i in w.items)
+            return group
+
+    def _do(self, group: list[_Waiting]) -> None:
+        seq, numbered = self._next, list[Item]()
+        for waiting in group:
+            for item in waiting.items:
+                numbered.append(Item(item.entry._replace(seq=seq), item.message))
+                seq += 1
+        try:
+            self._log.append([item.entry for item in numbered])
+        except SQLAlchemyError as error:
+            _log.error("the log cannot be written: %s", type(error).__name__)
+            for waiting in group:
+                waiting.done.set_exception(
+                    BusyError("the log cannot be written now", remedy="send it again later")
+                )
+            return
+        self._next, first = seq, numbered[0].entry.seq
+        for waiting in group:
+            waiting.done.set_result(list(range(first, first + len(waiting.items))))
+            first += len(waiting.items)
+        changes = []
+        for item in numbered:
+            applied = self._live.apply(item.entry, item.message)
+            if applied is not None:
+                changes.append(applied)
+            self.applied = item.entry.seq
+        self._publish(changes)
+
+    def _checkpoint(self) -> None:
+        now = self._clock()
+        self._due = now + self._config.checkpoint_every
+        self._unsaved += self._live.checkpoint()
+        try:
+            self._tracks.save(self.applied, self._unsaved)
+        except SQLAlchemyError as error:
+            _log.error("the checkpoint cannot be written: %s", type(error).__name__)
+            return
+        self._unsaved.clear()
+        self._kept = self.applied
+        self._live.release(now - self._config.idle)
+
+
+def recover(log: IngestLog, live: Live, tracks: TrackStore, now: float, idle: float) -> int:
+    """Bring tracks back as they were: recent checkpoints, then the log after them. How many entries were read again.
+
+    A recent track whose checkpoint is of another version is made again from what the log still has of it.
+    """
+    kept, n = tracks.round(), 0
+    for row in tracks.newest(heard_after=now - idle):
+        if not live.load(row.track):
+            for entry in log.read(track=row.track):
+                if entry.seq <= kept:
+                    live.apply(entry)
+                    n += 1
+    for entry in log.read(after=kept):
+        live.apply(entry)
+        n += 1
+    return n

@@ -1,0 +1,62 @@
+"""A site as the server holds it: its plan, and a tracker per version of its radio map."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from wayfuse.core.errors import RadioMapError
+from wayfuse.maps.site import Site
+from wayfuse.presets.fused import check_floors
+from wayfuse.presets.methods import build_method
+from wayfuse.radio.survey import Survey
+from wayfuse.radio.walk_survey import load
+from wayfuse.tracking.tracker import Tracker
+
+__all__ = ["World", "survey_of"]
+
+
+def survey_of(site: Site, archive: bytes) -> Survey:
+    """The survey of a radio map's archive (`wayfuse survey build`), checked against a site.
+
+    Raises
+    ------
+    RadioMapError : it is none, or of another site.
+    """
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "radio-map.npz"
+        path.write_bytes(archive)
+        made = load(path)
+    check_floors(site, made.survey)
+    if made.site != site.name:
+        raise RadioMapError(
+            f"radio map of site {made.site}, not of {site.name}", remedy="build the radio map with this site"
+        )
+    return made.survey
+
+
+class World:
+    """A site with its trackers.
+
+    Parameters
+    ----------
+    site : its plan. archive : gives the bytes of a version of its radio map. method : of `presets.methods`.
+    """
+
+    def __init__(
+        self, site: Site, archive: Callable[[int], bytes], *, method: str = "fused", n_particles: int = 1000
+    ) -> None:
+        self.site = site
+        self._archive, self._method, self._n_particles = archive, method, n_particles
+        self._trackers: dict[int, Tracker[Any]] = {}
+
+    def tracker(self, version: int) -> Tracker[Any]:
+        """The tracker with a version of the radio map; built when first asked for."""
+        if version not in self._trackers:
+            survey = survey_of(self.site, self._archive(version))
+            self._trackers[version] = build_method(
+                self._method, self.site, survey, n_particles=self._n_particles
+            )
+        return self._trackers[version]
