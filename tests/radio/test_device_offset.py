@@ -39,8 +39,9 @@ def test_mean_distances_are_those_of_each_version_alone(
         np.uint64
     )
     rssi = rng.uniform(-104, -30, (len(ids), versions)).astype(np.float32)
-    got = radio_map.mean_distances(ids, rssi, k)
-    assert got is not None
+    column = survey.columns(ids)
+    known = column >= 0
+    got = radio_map.mean_distances(column[known], rssi[known], k)
     assert got.shape == (versions,)
     for s in range(versions):
         alone, _ = radio_map.distances(Fingerprint(ids, rssi[:, s], np.zeros(len(ids), np.int32)))
@@ -48,11 +49,10 @@ def test_mean_distances_are_those_of_each_version_alone(
         assert got[s] == pytest.approx(np.sort(padded)[:k].mean(), abs=3e-6)
 
 
-def test_mean_distances_of_unknown_access_points_are_none() -> None:
-    ids = np.array([900, 901], np.uint64)
-    assert SparseKnn(made_up()).mean_distances(ids, np.full((2, 3), -50.0, np.float32), 5) is None
+def test_mean_distances_of_nothing_are_one() -> None:
     none = np.empty((0, 3), np.float32)
-    assert SparseKnn(made_up()).mean_distances(ids[:0], none, 5) is None
+    got = SparseKnn(made_up()).mean_distances(np.empty(0, np.int64), none, 5)
+    np.testing.assert_array_equal(got, np.ones(3, np.float32))
 
 
 def test_bands_and_shifts() -> None:

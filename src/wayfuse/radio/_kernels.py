@@ -29,9 +29,10 @@ def accumulate_overlap(
         a = columns[q]
         v = values[q]
         w = weights[q]
-        for k in range(start[a], start[a + 1]):
+        # without a sign there is no look whether an index counts from the end
+        for k in range(np.uint64(start[a]), np.uint64(start[a + 1])):
             u = row_values[k]
-            out[rows[k]] += w * (u if u < v else v)
+            out[np.uint32(rows[k])] += w * (u if u < v else v)
 
 
 @kernel
@@ -70,9 +71,17 @@ def nearest_mean_distances(
 
     ``values`` (A, S) of the query's access points in each version; ``best`` (S, k) is scratch; ``out`` (S,).
     """
-    n, versions, k = row_sum.shape[0], values.shape[1], best.shape[1]
-    overlap = np.zeros((n, versions), np.float32)
+    versions, k = values.shape[1], best.shape[1]
+    most = 0
+    for q in range(columns.shape[0]):
+        most += start[columns[q] + 1] - start[columns[q]]
+    # only rows that have something in common are kept, in the order in which they are met; place 0 is nobody's
+    most = min(most, row_sum.shape[0]) + 1
+    place = np.zeros(row_sum.shape[0], np.int32)
+    met = np.empty(most, np.int32)
+    overlap = np.empty((most, versions), np.float32)
     total = np.full(versions, np.float32(1e-6))
+    n = 0
     for q in range(columns.shape[0]):
         a = columns[q]
         w = weights[q]
@@ -80,25 +89,38 @@ def nearest_mean_distances(
             total[s] += w * values[q, s]
         for i in range(start[a], start[a + 1]):
             u = row_values[i]
-            r = rows[i]
-            for s in range(versions):
-                v = values[q, s]
-                overlap[r, s] += w * (u if u < v else v)
-    best[:] = np.float32(1.0)
-    for r in range(n):
-        heard = np.float32(0.0)
+            r = np.uint32(rows[i])
+            m = place[r]
+            if m == 0:
+                n += 1
+                place[r] = n
+                met[n] = r
+                for s in range(versions):
+                    v = values[q, s]
+                    overlap[n, s] = w * (u if u < v else v)
+            else:
+                for s in range(versions):
+                    v = values[q, s]
+                    overlap[m, s] += w * (u if u < v else v)
+    best[:] = np.float32(1.0)  # the distance of rows with nothing in common
+    farthest = np.ones(versions, np.float32)
+    distance = np.empty(versions, np.float32)
+    for m in range(1, n + 1):
+        nearer = 0
         for s in range(versions):
-            heard = max(heard, overlap[r, s])
-        if heard == np.float32(0.0):  # nothing in common: distance 1, which is where best began
+            distance[s] = np.float32(1.0) - np.float32(2.0) * overlap[m, s] / (row_sum[met[m]] + total[s])
+            nearer += distance[s] < farthest[s]
+        if nearer == 0:
             continue
         for s in range(versions):
-            d = np.float32(1.0) - np.float32(2.0) * overlap[r, s] / (row_sum[r] + total[s])
-            if d < best[s, k - 1]:
+            d = distance[s]
+            if d < farthest[s]:
                 j = k - 1
                 while j > 0 and best[s, j - 1] > d:
                     best[s, j] = best[s, j - 1]
                     j -= 1
                 best[s, j] = d
+                farthest[s] = best[s, k - 1]
     for s in range(versions):
         mean = np.float32(0.0)
         for j in range(k):

@@ -13,7 +13,7 @@ makes one place look like it: no position is needed, and no calibration walk.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
@@ -72,25 +72,27 @@ class DeviceOffset:
     strongest: int = 40
     every: int = 4
     memory: float = 60.0
+    grid: Array = field(
+        init=False, repr=False, compare=False
+    )  # shifts (n_shifts,) dB, ascending, zero among them
+    _prior: Array = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         if not (self.reach >= self.spacing > 0.0 and min(self.prior) > 0.0 and self.temperature > 0.0):
             raise ConfigError("reach, spacing, prior and temperature must be positive", where="DeviceOffset")
         if min(self.k, self.every, self.strongest) < 1 or not self.memory > 0.0:
             raise ConfigError("k, every, strongest and memory must be positive", where="DeviceOffset")
-
-    @property
-    def grid(self) -> Array:
-        """Shifts (n_shifts,) dB, ascending, zero among them."""
         n = int(self.reach / self.spacing)
-        return np.arange(-n, n + 1, dtype=np.float64) * self.spacing
+        s = np.arange(-n, n + 1, dtype=np.float64) * self.spacing
+        cost = np.stack([0.5 * (s / sigma) ** 2 for sigma in self.prior])
+        cost[:, s == 0.0] -= self.same_phone
+        for name, value in (("grid", s), ("_prior", cost)):
+            value.flags.writeable = False
+            object.__setattr__(self, name, value)
 
     def init(self) -> OffsetState:
         """State before the first scan: the prior."""
-        s = self.grid
-        cost = np.stack([0.5 * (s / sigma) ** 2 for sigma in self.prior])
-        cost[:, s == 0.0] -= self.same_phone
-        return OffsetState(cost)
+        return OffsetState(self._prior)
 
     def shift(self, state: OffsetState) -> Array:
         """Posterior mean of the shift (N_BANDS,) dB to add to the device's levels."""
@@ -102,28 +104,21 @@ class DeviceOffset:
         state = state._replace(n_seen=state.n_seen + 1)
         if state.n_seen > self.burn_in and state.n_seen % self.every:
             return state
-        known = radio_map.survey.columns(fingerprint.bssid) >= 0  # strangers must not crowd out the others
-        if not np.any(known):  # a scan of unknown access points says nothing
+        column = radio_map.survey.columns(fingerprint.bssid)
+        used = np.flatnonzero(column >= 0)  # strangers must not crowd out the others
+        if not len(used):  # a scan of unknown access points says nothing
             return state
-        bssid, rssi, frequency = (
-            fingerprint.bssid[known],
-            fingerprint.rssi[known],
-            fingerprint.frequency[known],
-        )
-        if len(rssi) > self.strongest:
-            loud = np.sort(np.argsort(-rssi, kind="stable")[: self.strongest])
-            bssid, rssi, frequency = bssid[loud], rssi[loud], frequency[loud]
-        mean, band, grid = self.shift(state), band_of(frequency), self.grid
+        if len(used) > self.strongest:
+            used = used[np.sort(np.argsort(-fingerprint.rssi[used], kind="stable")[: self.strongest])]
+        band, n = band_of(fingerprint.frequency[used]), len(self.grid)
+        heard = np.unique(band)
+        # versions of the scan: each band in turn at every shift, the other at its mean
+        trial = np.repeat(self.shift(state)[band][:, None], len(heard) * n, axis=1)
+        for row, b in enumerate(heard.tolist()):
+            trial[band == b, row * n : (row + 1) * n] = self.grid
+        levels = (fingerprint.rssi[used][:, None] + trial).astype(np.float32)
         added = np.zeros_like(state.cost)
-        for b in range(N_BANDS):
-            if not np.any(band == b):
-                continue
-            trial = np.where((band == b)[:, None], grid, mean[band][:, None])
-            levels = (rssi[:, None] + trial).astype(np.float32)
-            distance = radio_map.mean_distances(bssid, levels, self.k)
-            if distance is not None:
-                added[b] = distance
-        prior = self.init().cost
+        added[heard] = radio_map.mean_distances(column[used], levels, self.k).reshape(-1, n)
         fade = np.exp(-1.0 / self.memory)
         gain = (added - added.min(axis=1, keepdims=True)) / self.temperature
-        return state._replace(cost=prior + fade * (state.cost - prior) + gain)
+        return state._replace(cost=self._prior + fade * (state.cost - self._prior) + gain)

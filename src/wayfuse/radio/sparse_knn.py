@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wayfuse.core.errors import ConfigError, RadioMapError
-from wayfuse.core.types import Array32, IdArray
+from wayfuse.core.types import Array32
 from wayfuse.radio._kernels import accumulate_overlap, nearest, nearest_mean_distances
 from wayfuse.radio.survey import Fingerprint, Fix, Survey
 from wayfuse.radio.twins import twin_shares
@@ -140,19 +140,15 @@ class SparseKnn:
             n_aps,
         )
 
-    def mean_distances(self, bssid: IdArray, rssi: Array32, k: int) -> Array32 | None:
-        """Mean distance of the k nearest for versions of a query, (S,): rssi (A, S) dBm of access points (A,).
+    def mean_distances(self, column: NDArray[np.int64], rssi: Array32, k: int) -> Array32:
+        """Mean distance of the k nearest for versions of a query, (S,): rssi (A, S) dBm of the survey's columns (A,).
 
-        None where no access point is known. Fewer than k fingerprints count as if the missing had distance 1.
+        Fewer than k fingerprints count as if the missing had distance 1.
         """
-        column = self.survey.columns(bssid)
-        known = column >= 0
-        if not np.any(known):
-            return None
-        column, versions = column[known], rssi.shape[1]
+        versions = rssi.shape[1]
         # whole vectors of the processor: the innermost loop goes over versions
         value = np.zeros((len(column), -(-versions // _LANES) * _LANES), np.float32)
-        value[:, :versions] = self._represent(rssi[known])
+        value[:, :versions] = self._represent(rssi)
         out = np.empty(value.shape[1], np.float32)
         best = np.empty((value.shape[1], k), np.float32)
         nearest_mean_distances(
