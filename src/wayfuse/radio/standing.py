@@ -31,10 +31,9 @@ class Standing(NamedTuple):
 
     @classmethod
     def of(cls, fingerprint: Fingerprint) -> Standing:
-        """After the first scan."""
-        order = np.argsort(fingerprint.bssid, kind="stable")
-        bssid, rssi = fingerprint.bssid[order], fingerprint.rssi[order]
-        return cls(bssid, fingerprint.frequency[order], np.ones(len(bssid), np.float32), rssi, 1.0)
+        """After the first scan, its access points ascending as `radio.scans.ScanBuffer` gives them."""
+        bssid, rssi, frequency = fingerprint
+        return cls(bssid, frequency, np.ones(len(bssid), np.float32), rssi, 1.0)
 
     def add(self, fingerprint: Fingerprint, memory: float = 5.0) -> Standing:
         """After another scan; older ones fade with 1/``memory`` per scan."""
@@ -52,5 +51,7 @@ class Standing(NamedTuple):
     @property
     def fingerprint(self) -> Fingerprint:
         """The mean of the scans; what was heard in too few of them is left out."""
+        if self.total == 1.0:  # of one scan
+            return Fingerprint(self.bssid, self.level, self.frequency)
         often = self.weight >= _HEARD_AT_LEAST * self.total
         return Fingerprint(self.bssid[often], self.level[often] / self.weight[often], self.frequency[often])
