@@ -198,9 +198,11 @@ def _tracker(
         scale_sigma=c.scale_sigma,
     )
     constraint, particle_filter = _constraint(site, c), ParticleFilter(resampler(c.resampling))
-    floor_change = FloorChange(
-        connectors=ConnectorMotion(site=site), steps=motion, filter=particle_filter, constraint=constraint
-    )
+    floor_change = None
+    if c.use_vertical and len(site.floors) > 1:
+        floor_change = FloorChange(
+            connectors=ConnectorMotion(site=site), steps=motion, filter=particle_filter, constraint=constraint
+        )
     known = (
         KnownStart(
             x=start.x,
@@ -225,7 +227,7 @@ def _tracker(
         filter=particle_filter,
         recovery=Recovery(injection=c.injection, injection_least=c.injection_least),
         summary=c.summary,
-        floor_change=floor_change if c.use_vertical and len(site.floors) > 1 else None,
+        floor_change=floor_change,
         walkable=_walkable(site, c),
         n_particles=c.n_particles,
         uses_steps=c.use_steps,
