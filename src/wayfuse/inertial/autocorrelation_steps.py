@@ -38,7 +38,7 @@ __all__ = ["AutocorrelationSteps", "StepCounts", "count_steps", "normalised_auto
 
 _RATE = 50.0  # Hz, of the norm that is correlated: that of liu2017, Sec. IV-A, and about that of [1]_
 _GRAVITY = 9.81  # m/s²
-_TINY = 1e-12  # (m/s²)², a variance below is rounding
+_TINY = 1e-12  # (m/s²)² or g², a variance below is rounding
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -67,9 +67,9 @@ class StepCounts(NamedTuple):
 
 
 def normalised_autocorrelation(norm: Array, lags: NDArray[np.integer]) -> Array:
-    """chi(m, tau), (lags, n), of a norm (n,) m/s² sampled evenly, at lags in samples; 0 where two cycles do not fit.
+    """chi(m, tau), (lags, n), of a norm (n,) sampled evenly, at lags in samples; 0 where two cycles do not fit.
 
-    Samples m - 2 tau + 1 to m are used: none is later than m.
+    Samples m - 2 tau + 1 to m are used: none is later than m. The norm may be in m/s² or g: 0 where it is constant.
     """
     a = norm - norm.mean()  # sums of what is near zero keep their digits
     sums, squares = _cumulated(a), _cumulated(a * a)

@@ -36,6 +36,7 @@ import numpy as np
 
 from wayfuse.core.errors import ConfigError, UsageError
 from wayfuse.core.types import Array, BoolArray, IntArray
+from wayfuse.inertial.autocorrelation_steps import normalised_autocorrelation
 from wayfuse.sensors.recording import Series
 
 __all__ = [
@@ -50,7 +51,6 @@ __all__ = [
 ]
 
 _GRAVITY = 9.80665  # m/s²
-_FLAT = 1e-6  # g, standard deviation below which a window has no autocorrelation
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -109,21 +109,14 @@ def uniform_norm(acceleration: Series, config: StageConfig) -> Array:
 def best_autocorrelation(a: Array, tau_min: int, tau_max: int) -> tuple[Array, IntArray]:
     """Psi (m,) and its lag (m,) for the samples of a (n,) with 2 tau_max samples ahead; m = n - 2 tau_max + 1 or 0."""
     m = max(len(a) - 2 * tau_max + 1, 0)
-    psi, tau = np.full(m, -1.0), np.full(m, tau_min)
+    lags = np.arange(tau_min, tau_max + 1)
     if m == 0:
-        return psi, tau
-    a = a - a.mean()  # changes no autocorrelation, but keeps the sums small
-    total, squares = (np.concatenate([[0.0], np.cumsum(v)]) for v in (a, a * a))
-    for lag in range(tau_min, tau_max + 1):
-        products = np.concatenate([[0.0], np.cumsum(a[:-lag] * a[lag:])])
-        alpha = (total[lag:] - total[:-lag]) / lag
-        variance = np.maximum((squares[lag:] - squares[:-lag]) / lag - alpha * alpha, 0.0)
-        both = np.sqrt(variance[:m] * variance[lag : lag + m])
-        covariance = (products[lag : lag + m] - products[:m]) / lag - alpha[:m] * alpha[lag : lag + m]
-        kappa = np.where(both > _FLAT**2, covariance / np.maximum(both, _FLAT**2), 0.0)  # Eq. 1
-        better = kappa > psi
-        psi[better], tau[better] = kappa[better], lag
-    return psi, tau
+        return np.zeros(0), lags[:0]
+    chi = normalised_autocorrelation(a, lags)
+    # Eq. 1 looks ahead from sample m, chi back from the last of the same samples
+    kappa = np.stack([of[2 * lag - 1 : 2 * lag - 1 + m] for of, lag in zip(chi, lags.tolist(), strict=True)])
+    best = np.argmax(kappa, axis=0)  # of equals the shortest lag
+    return kappa[best, np.arange(m)], lags[best]
 
 
 def find_stages(a: Array, config: StageConfig) -> Stages:
