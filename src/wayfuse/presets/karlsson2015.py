@@ -41,6 +41,10 @@ class Config:
     length_sigma: float = 0.1  # m, sigma_r of Eq. 2; not printed
     heading_sigma: float = 0.1  # rad, sigma_v of Eq. 2, per step; not printed
     n_particles: int = 2000  # not printed
+    # of `karlsson2015_tracker` alone, for real buildings:
+    most: float = 10.0  # readings that a scan may count for; the walks of the paper heard about as many
+    offset_sigma: float = 6.0  # dB, between phones
+    start_sigma: float = 1.0  # m, of a start that is told
     filter: ParticleFilter = field(
         default_factory=ParticleFilter
     )  # systematic, at half the effective sample size

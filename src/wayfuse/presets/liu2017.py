@@ -23,6 +23,7 @@ from wayfuse.core.angles import wrap
 from wayfuse.core.philox import Noise
 from wayfuse.core.types import Array
 from wayfuse.filters.resampling import systematic
+from wayfuse.models.motion.proportional_noise import Poses, ProportionalNoise, Report
 from wayfuse.radio.ap_sequence import Neighbours, from_positions, kernel_log_likelihood, nearest
 from wayfuse.radio.knn import distances
 from wayfuse.radio.representation import Representation
@@ -54,6 +55,11 @@ class Config:
     walk_sigma: float = 1.75  # m per axis and scan, Wi-Fi alone; not in the paper
     scan_every: int = 1  # of the scans, one in so many is used; Fig. 7 has 1, 2, 4, 8
     missing: float = -100.0  # dBm that is the zero of the cosine; not in the paper
+    # of `liu2017_tracker` alone, for real buildings:
+    most: int = 20  # loudest access points of a floor that make a sequence; 20 give 190 pairs
+    levelled: bool = True  # take off how much louder each access point is, where a survey tells
+    start_sigma: float = 1.0  # m, of a start that is told
+    heading_sigma: float = 0.25  # rad, of the phone's heading at the start
 
     @property
     def precision(self) -> float:
@@ -94,9 +100,12 @@ def fingerprint_neighbours(xy: Array, surveyed: Array, rssi: Array, config: Conf
 def fused(motion: Motion, start: Pose, scans: Sequence[Neighbours], seed: int, config: Config) -> Array:
     """Estimates (T, 2) m of the filter of Sec. III: dead reckoning moves, scans weigh."""
     steps, turns = _increments(motion)
+    model = ProportionalNoise(
+        step_length=config.step_length, distance_sigma=config.distance_sigma, turn_sigma=config.turn_sigma
+    )
 
-    def predict(particles: _Particles, t: int, noise: Noise) -> _Particles:
-        return _moved(particles, steps[t], turns[t], noise, config)
+    def predict(particles: Poses, t: int, noise: Noise) -> Poses:
+        return model.move(noise, particles, Report(steps[t], turns[t]))
 
     return _filtered(start, predict, scans, seed, config)
 
@@ -104,10 +113,10 @@ def fused(motion: Motion, start: Pose, scans: Sequence[Neighbours], seed: int, c
 def wifi_alone(start: Pose, scans: Sequence[Neighbours], seed: int, config: Config) -> Array:
     """Estimates (T, 2) m without motion sensors: the same filter on a random walk."""
 
-    def predict(particles: _Particles, _: int, noise: Noise) -> _Particles:
+    def predict(particles: Poses, _: int, noise: Noise) -> Poses:
         x, y, heading = particles
         drawn = config.walk_sigma * noise.normals(len(x))
-        return _Particles(x + drawn[0], y + drawn[1], heading)
+        return Poses(x + drawn[0], y + drawn[1], heading)
 
     return _filtered(start, predict, scans, seed, config)
 
@@ -122,15 +131,7 @@ def dead_reckoning(motion: Motion, start: Pose, config: Config) -> Array:
     return np.asarray(np.concatenate([np.zeros((1, 2)), np.cumsum(move, axis=0)]) + start[:2])
 
 
-class _Particles(NamedTuple):
-    """Places x, y (N,) m and headings (N,) rad."""
-
-    x: Array
-    y: Array
-    heading: Array
-
-
-_Predict: TypeAlias = Callable[[_Particles, int, Noise], _Particles]
+_Predict: TypeAlias = Callable[[Poses, int, Noise], Poses]
 
 
 def _increments(motion: Motion) -> tuple[Array, Array]:
@@ -139,23 +140,12 @@ def _increments(motion: Motion) -> tuple[Array, Array]:
     return np.diff(motion.step_count, prepend=motion.step_count[:1]), wrap(turns)
 
 
-def _moved(before: _Particles, steps: float, turn: float, noise: Noise, config: Config) -> _Particles:
-    x, y, heading = before
-    drawn = noise.normals(len(x))
-    reach = config.step_length * steps
-    return _Particles(
-        x + reach * np.cos(heading) * (1.0 + config.distance_sigma * drawn[0]),  # Eq. 5
-        y + reach * np.sin(heading) * (1.0 + config.distance_sigma * drawn[1]),  # Eq. 6
-        heading + turn * (1.0 + config.turn_sigma * drawn[2]),  # Eq. 7
-    )
-
-
 def _filtered(
     start: Pose, predict: _Predict, scans: Sequence[Neighbours], seed: int, config: Config
 ) -> Array:
     """Predict, correct, resample (Sec. III-A); the estimate is the weighted mean before resampling."""
     noise = Noise.of(seed, "liu2017")
-    particles = _Particles(*(np.full(config.n_particles, value) for value in start))
+    particles = Poses(*(np.full(config.n_particles, value) for value in start))
     out = np.empty((len(scans), 2))
     for t, scan in enumerate(scans):
         if t > 0:
@@ -168,5 +158,5 @@ def _filtered(
         weights = np.exp(log_likelihood - log_likelihood.max())
         out[t] = weights @ xy / weights.sum()
         ancestors = systematic(noise, weights, len(weights))
-        particles = _Particles(*(column[ancestors] for column in particles))
+        particles = Poses(*(column[ancestors] for column in particles))
     return out

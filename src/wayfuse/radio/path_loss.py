@@ -119,23 +119,32 @@ def distances(xy: Array, ap_xy: Array) -> Array:
     return np.hypot(xy[:, None, 0] - ap_xy[None, :, 0], xy[:, None, 1] - ap_xy[None, :, 1])
 
 
-def log_likelihood(bands: Sequence[PathLoss], ap_xy: Array, rssi: Array, xy: Array) -> Array:
+def log_likelihood(
+    bands: Sequence[PathLoss], ap_xy: Array, rssi: Array, xy: Array, *, offset_sigma: float = 0.0
+) -> Array:
     """Log-likelihood of one scan at candidate places: a Gaussian per access point and band, in the log domain.
 
     Parameters
     ----------
     bands : of length b. ap_xy : (m, 2) m, where the access points are. rssi : (b, m) dBm, NaN where not heard (says
-    nothing). xy : (N, 2) m.
+    nothing). xy : (N, 2) m. offset_sigma : dB, of an offset that all readings of the scan share, integrated out; not
+    in [1]_, whose phone is the one that the parameters were fitted with.
 
     Returns
     -------
     (N,) natural log; constants over N are dropped; finite: the sum of 40 densities of 10 sigma is no underflow here.
     """
-    total = np.zeros(len(xy))
+    total, shared = np.zeros(len(xy)), np.zeros(len(xy))
+    precision = 0.0
     heard_any = np.isfinite(rssi).any(axis=0)
     distance = distances(xy, ap_xy[heard_any])
     for band, reading in zip(bands, rssi[:, heard_any], strict=True):
         heard = np.isfinite(reading)
         z = (reading[heard] - band.at(distance[:, heard])) / band.sigma
         total -= 0.5 * (z * z).sum(axis=1)
+        shared += z.sum(axis=1) / band.sigma
+        precision += float(heard.sum()) / band.sigma**2
+    if offset_sigma > 0.0:
+        # the covariance sigma^2 I + offset_sigma^2 1 1' by the formula of Sherman and Morrison
+        total += 0.5 * shared**2 / (precision + offset_sigma**-2)
     return total

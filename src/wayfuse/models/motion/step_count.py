@@ -23,8 +23,9 @@ import numpy as np
 from wayfuse.core.errors import ConfigError
 from wayfuse.core.philox import Noise
 from wayfuse.filters.cloud import Cloud
+from wayfuse.models.motion.pdr import StepInput
 
-__all__ = ["CountedSteps", "StepCountMotion"]
+__all__ = ["CountedSteps", "StepByStep", "StepCountMotion"]
 
 
 class CountedSteps(NamedTuple):
@@ -59,3 +60,14 @@ class StepCountMotion:
             y=cloud.y + length * np.sin(theta),
             heading_bias=cloud.heading_bias + np.float32(self.heading_sigma) * z[1],
         )
+
+
+@dataclass(frozen=True, slots=True)
+class StepByStep:
+    """The same for the steps of a tracker: an event each, with the measured heading; the length is the motion's own."""
+
+    motion: StepCountMotion
+
+    def propagate(self, noise: Noise, cloud: Cloud, event: StepInput) -> Cloud:
+        """One step."""
+        return self.motion.propagate(noise, cloud, CountedSteps(1, event.heading))

@@ -1,0 +1,77 @@
+"""karlsson2015 as a tracker of real recordings: path loss of both bands, steps, start heading unknown."""
+
+from __future__ import annotations
+
+from wayfuse.maps.site import Site
+from wayfuse.models.initial import KnownStart
+from wayfuse.models.motion.random_walk import RandomWalk
+from wayfuse.models.motion.step_count import StepByStep, StepCountMotion
+from wayfuse.models.observation.placed_aps import PathLossLikelihood
+from wayfuse.models.placed_start import AnywhereOnFloor, ToldStart
+from wayfuse.presets.fused import check_floors, prior_estimate
+from wayfuse.presets.karlsson2015 import Config
+from wayfuse.presets.liu2017_tracker import known_places
+from wayfuse.radio.ap_hearing import fitted_levels
+from wayfuse.radio.ap_places import ApPlaces
+from wayfuse.radio.survey import Survey
+from wayfuse.tracking.dead_reckoning import Start
+from wayfuse.tracking.plain_engine import PlainEngine, PlainState
+from wayfuse.tracking.tracker import Tracker
+
+__all__ = ["build"]
+
+
+def build(
+    site: Site,
+    survey: Survey | None,
+    *,
+    places: ApPlaces | None = None,
+    start: Start | None = None,
+    config: Config | None = None,
+    lag: float = 0.0,
+    use_steps: bool = True,
+) -> Tracker[PlainState]:
+    """The tracker of a site by the places of its access points; estimated from the survey where none are given.
+
+    Where there is a survey the path loss of each band is fitted to it, else it is that of the configuration. The
+    heading at the start is always unknown; the start is, unless told, anywhere on the floor of the first scan.
+
+    Raises
+    ------
+    UsageError : neither places nor a survey.
+    """
+    c = config or Config()
+    if survey is not None:
+        check_floors(site, survey)
+    places = known_places(site, survey, places)
+    levels = None if survey is None else fitted_levels(survey, places, c.bands)
+    told = start and KnownStart(x=start.x, y=start.y, floor=start.floor, sigma=c.start_sigma, scale_sigma=0.0)
+    walkable = tuple(floor.walkable for floor in site.floors)
+    engine = PlainEngine(
+        n_floors=len(site.floors),
+        prior=prior_estimate(site),
+        first=ToldStart(told, has_compass=False)
+        if told
+        else AnywhereOnFloor(places=places, walkable=walkable),
+        starts_unseen=told is not None,
+        motion=StepByStep(
+            StepCountMotion(
+                step_length=c.step_length, length_sigma=c.length_sigma, heading_sigma=c.heading_sigma
+            )
+        ),
+        quiet=RandomWalk(c.walk_sigma),
+        observation=PathLossLikelihood(
+            places=places,
+            bands=c.bands if levels is None else levels.bands,
+            n_floors=len(site.floors),
+            most=c.most,
+            offset_sigma=c.offset_sigma,
+            power=None if levels is None else levels.power,
+        ),
+        filter=c.filter,
+        always_resample=False,
+        n_particles=c.n_particles,
+        rotation=site.anchor.rotation if site.anchor is not None else 0.0,
+        uses_steps=use_steps,
+    )
+    return Tracker(engine=engine, lag=lag)
