@@ -88,17 +88,18 @@ def test_what_is_missing_is_told(world: Any, name: str) -> None:
         build(world.site, None, places=elsewhere)
 
 
-@pytest.mark.real_data
-@both
-def test_one_real_walk(data_root: Path, name: str) -> None:
-    from wayfuse.evaluation.results_repetitions import gather, key_of
-
+@pytest.fixture(scope="module")
+def museum(data_root: Path) -> Repetitions:
+    """All walks of ipin2023-track3."""
     folder = data_root / "ipin2023-track3" / "logs"
     if not folder.is_dir():
-        pytest.skip(
-            "REAL DATA ABSENT: no ipin2023-track3; fetch with `wayfuse datasets fetch ipin2023-track3`"
-        )
-    repetitions = gather(folder)
+        pytest.skip("REAL DATA ABSENT: `wayfuse datasets fetch ipin2023-track3`")
+    return gather(folder)
+
+
+@pytest.mark.real_data
+@both
+def test_one_real_walk(museum: Repetitions, name: str) -> None:
     walk = next(r for r in museum.recordings if key_of(r.name) == (1, 1))
     start = first_waypoint(museum.site, walk)
     tracker = BUILDS[name][0](museum.site, museum.survey(1), start=start)

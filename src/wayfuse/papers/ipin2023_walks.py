@@ -100,7 +100,7 @@ def walk_table(
     note: str,
     seeds: Sequence[int] = SEEDS,
 ) -> Table:
-    """Mean, median and 90th percentile of the error at the waypoints, and the right floor; or that there are no data."""
+    """Mean, median and 90th percentile of the error at the waypoints, the right floor; or that there are no data."""
     if not (folder.is_dir() and any(folder.glob("*.txt"))):
         why = "`wayfuse datasets fetch ipin2023-track3` gets the data set"
         return Table(title, ("not measured",), ((why,),))
