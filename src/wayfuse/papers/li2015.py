@@ -1,11 +1,10 @@
-"""li2015: Table 1, what the exponents 1/d are good for, and ranges from real channel state."""
+"""li2015: Table 1 and what the exponents 1/d are good for; `papers.li2015_real` has the real data."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
-from pathlib import Path
 
 import numpy as np
 
@@ -13,18 +12,16 @@ from wayfuse.core.philox import Noise
 from wayfuse.core.types import Array
 from wayfuse.evaluation.results_bars import Bar, at_least, at_most, within
 from wayfuse.evaluation.results_folds import Mapper
-from wayfuse.formats import intel5300
 from wayfuse.formats.datasets import data_root
 from wayfuse.models.observation.ranges import Exponents
+from wayfuse.papers.li2015_real import captures, range_tables
 from wayfuse.papers.reproduction import Interval, Reproduction, Table, mean_interval
 from wayfuse.presets.li2015 import R_PF, Config, dead_reckon, track
-from wayfuse.radio.csi import direct_path_power
 from wayfuse.radio.multilateration import (
     constrained_least_squares,
     weighted_centroid,
     weighted_least_squares,
 )
-from wayfuse.radio.ranging import fit_antennas, fit_range, mean_range
 from wayfuse.simulator.li2015_world import (
     EQUAL_ERRORS,
     GROWING_ERRORS,
@@ -148,8 +145,8 @@ def reproduce(seeds: Sequence[int], mapper: Mapper) -> Reproduction:
     figures = _Figures(list(mapper(Experiment(), seeds, "li2015")))
     tables = [_table_1(figures), _exponents(figures), _further(figures)]
     bars = _bars(figures)
-    captures, met = _captures(data_root() / "csi" / "intel5300-distance")
-    tables.append(captures)
+    table, met = captures(data_root() / "csi" / "intel5300-distance")
+    tables += [table, *range_tables(data_root() / "wifi-rtt", mapper)]
     bars += met
     return Reproduction("li2015", tuple(seeds), tuple(tables), tuple(bars), figures.lost())
 
@@ -219,37 +216,3 @@ def _bars(figures: _Figures) -> list[Bar]:
         ratio = of("FW-PF", s, "equal") / of("FW-PF 1/N", s, "equal")
         bars.append(at_least(f"1/d over 1/N, equal errors, {4 + s} ANs", 1.0, ratio, ""))
     return bars
-
-
-def _captures(folder: Path) -> tuple[Table, list[Bar]]:
-    """Ranges of captures named ``<metres>-...``, each from regressions on all others; no row without the data."""
-    title, columns = (
-        "Real channel state: range, leave one capture out",
-        ("input", "mean, m", "90 %, m", "greatest, m"),
-    )
-    paths = sorted(folder.glob("*.dat"))
-    if not paths:
-        note = "REAL DATA ABSENT: fetch with `wayfuse datasets fetch csi`; the bar of 0.3 m was not tried."
-        return Table(title, columns, (), note), []
-    frames = [intel5300.read(path).csi for path in paths]
-    true = np.array([float(path.name.split("-")[0]) for path in paths])
-    power = np.array([np.nanmedian([direct_path_power(f) for f in each], axis=0) for each in frames])
-    rss = np.array([np.nanmedian([f.rss for f in each]) for each in frames])
-    others = ~np.eye(len(true), dtype=bool)
-    found = {
-        "direct path, mean over antennas": [
-            mean_range(fit_antennas(power[k], true[k]), power[i]) for i, k in enumerate(others)
-        ],
-        "received power (RSS) alone": [
-            fit_range(rss[k], true[k]).distance(rss[i]) for i, k in enumerate(others)
-        ],
-        "mean distance of the other captures": [true[k].mean() for k in others],
-    }
-    errors = {name: np.abs(np.array(ranges, dtype=np.float64) - true) for name, ranges in found.items()}
-    rows = tuple((n, float(e.mean()), float(np.percentile(e, 90)), float(e.max())) for n, e in errors.items())
-    note = (
-        f"{len(paths)} captures at 1 to 4.5 m, median over each; distances are those of the file names. In this one "
-        "line-of-sight set-up channel state brings no gain over the received power."
-    )
-    mean = float(errors["direct path, mean over antennas"].mean())
-    return Table(title, columns, rows, note), [at_most("range of real captures, mean", 0.3, mean, "m")]

@@ -16,6 +16,7 @@ from wayfuse.filters._kernels import normalise
 from wayfuse.filters.resampling import systematic
 from wayfuse.models.motion.constant_velocity import ConstantVelocity, MovingCloud
 from wayfuse.models.observation.ranges import Exponents, RangeLikelihood, VelocityLikelihood
+from wayfuse.radio.range_correction import AS_MEASURED, RangeLine
 
 __all__ = ["R_PF", "Config", "dead_reckon", "track"]
 
@@ -34,13 +35,19 @@ class Config:
     ess_ratio: float = 0.5  # Algorithm 1, step 9
     start_sigma: float = 0.5  # m; not printed; the start is known
     start_velocity_sigma: float = 0.5  # m/s; not printed; at rest, or walking
+    # of the tracker of recordings alone (presets/li2015_tracker.py)
+    step_sigma: float = (
+        0.5  # m per axis, of a step: between sigma_v of 0.3 m/s and the fitted 1.8 over half a second
+    )
+    centroid_sigma: float = 3.0  # m, about the weighted centroid, where no start is told
+    range_line: RangeLine = AS_MEASURED  # from ranges to distances: what Section 5.1 is to powers
 
 
 R_PF = Config(velocity_sigma=None)  # Section 7.1: ranging only
 
 
 def track(
-    anchors: Array, ranges: Array, velocity: Array, start: tuple[float, float], dt: float, noise: Noise,
+    anchors: Array, ranges: Array, velocity: Array, start: tuple[float, float], dt: float | Array, noise: Noise,
     config: Config = Config(),
 ) -> Array:  # fmt: skip
     """Places (k, 2) m that Algorithm 1 gives, row by row.
@@ -48,7 +55,7 @@ def track(
     Parameters
     ----------
     anchors : (n, 2) m. ranges : (k, n) m, NaN where missing. velocity : (k, 2) m/s. start : m, place at row 0.
-    dt : s between rows. noise : the random numbers.
+    dt : s between rows, or (k,) s from the row before each. noise : the random numbers.
     """
     motion = ConstantVelocity(config.acceleration_sigma)
     from_ranges = RangeLikelihood(anchors, config.range_sigma, config.exponents)
@@ -56,10 +63,11 @@ def track(
     n = config.n_particles
     cloud = MovingCloud.around(noise, n, start, config.start_sigma, config.start_velocity_sigma)  # step 1
     log_weights, weights = np.zeros(n), np.full(n, 1.0 / n)
+    intervals = np.broadcast_to(np.asarray(dt, dtype=np.float64), len(ranges))
     places = np.empty((len(ranges), 2))
     places[0] = cloud.mean(weights)[:2]
     for k in range(1, len(ranges)):
-        cloud = motion.propagate(noise, cloud, dt)  # step 2
+        cloud = motion.propagate(noise, cloud, float(intervals[k]))  # step 2
         from_ranges.log_likelihood(cloud, ranges[k], log_weights)  # steps 3, 4
         if from_velocity is not None:
             from_velocity.log_likelihood(cloud, velocity[k], log_weights)  # step 5
