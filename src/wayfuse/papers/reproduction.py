@@ -19,7 +19,7 @@ from wayfuse.core.errors import UsageError
 from wayfuse.evaluation.results_bars import Bar
 from wayfuse.evaluation.results_folds import Mapper
 
-__all__ = ["PAPERS", "Interval", "Paper", "Reproduction", "Table", "mean_interval", "page", "paper"]
+__all__ = ["PAPERS", "Curve", "Interval", "Paper", "Reproduction", "Table", "mean_interval", "page", "paper"]
 
 PAPERS = ("chu2009", "he2014", "karlsson2015", "li2015", "liu2017")
 _STUDENT = 1.645  # of a normal: two sides, 90 %; with 20 seeds and more Student's differs by less than 5 %
@@ -55,14 +55,27 @@ class Table:
 
 
 @dataclass(frozen=True, slots=True)
+class Curve:
+    """A line of a picture. picture : file name. panel, label : what it is of. x, y : points, equally many."""
+
+    picture: str
+    panel: str
+    label: str
+    x: tuple[float, ...]
+    y: tuple[float, ...]
+
+
+@dataclass(frozen=True, slots=True)
 class Reproduction:
-    """Everything measured for one paper. lost : runs that lost the track, by row; they are never dropped."""
+    """Everything measured for one paper. lost : runs that lost the track, by row; they are never dropped. curves :
+    what a paper draws."""
 
     preset: str
     seeds: tuple[int, ...]
     tables: tuple[Table, ...]
     bars: tuple[Bar, ...]
     lost: tuple[str, ...] = field(default=())
+    curves: tuple[Curve, ...] = field(default=())
 
     def plain(self) -> dict[str, Any]:
         """As plain values for JSON."""

@@ -19,7 +19,18 @@ import numpy as np
 from wayfuse.core.types import Array
 from wayfuse.simulator.geometry import crossings
 
-__all__ = ["AP_PLACES", "SIDE", "Field", "FieldModel", "Walk", "draw_field", "room_walls", "walk"]
+__all__ = [
+    "AP_PLACES",
+    "SIDE",
+    "Field",
+    "FieldModel",
+    "Walk",
+    "draw_field",
+    "draw_pattern",
+    "rim_levels",
+    "room_walls",
+    "walk",
+]
 
 SIDE = 100.0  # m
 # the twelve of the paper, reordered so that the first n of them surround the field for every n
@@ -102,7 +113,7 @@ def draw_field(model: FieldModel, rng: np.random.Generator) -> Field:
     """Draw access points' powers and patterns, and survey the field."""
     places = AP_PLACES[: model.n_aps]
     power = model.power * (1.0 + model.vsp * rng.standard_normal(len(places)))
-    pattern = np.array([_pattern(model.doi, rng) for _ in places])
+    pattern = np.array([draw_pattern(model.doi, rng) for _ in places])
     line = np.arange(0.0, SIDE + 1e-9, model.grain)
     grid = np.stack(np.meshgrid(line, line), axis=-1)
     levels = _mean_levels(model, places, power, pattern, grid.reshape(-1, 2)).reshape(*grid.shape[:2], -1)
@@ -132,7 +143,11 @@ def walk(field: Field, rng: np.random.Generator) -> Walk:
 
 
 def _mean_levels(model: FieldModel, places: Array, power: Array, pattern: Array, xy: Array) -> Array:
-    walls = room_walls()
+    return rim_levels(places, power, pattern, room_walls(), model.waf, xy)
+
+
+def rim_levels(places: Array, power: Array, pattern: Array, walls: Array, waf: float, xy: Array) -> Array:
+    """Levels (m, a) dBm without noise at places (m, 2) m of access points at (a, 2) m behind walls (w, 4) m."""
     out = np.empty((len(xy), len(places)))
     for a, place in enumerate(places):
         to = xy - place
@@ -141,11 +156,11 @@ def _mean_levels(model: FieldModel, places: Array, power: Array, pattern: Array,
         i = np.floor(degree).astype(int) % 360
         k = pattern[a, i] + (degree - np.floor(degree)) * (pattern[a, (i + 1) % 360] - pattern[a, i])
         n_walls = crossings(np.broadcast_to(place, xy.shape), xy, walls).sum(axis=1)
-        out[:, a] = power[a] - loss * k - model.waf * np.minimum(n_walls, _MAX_WALLS)
+        out[:, a] = power[a] - loss * k - waf * np.minimum(n_walls, _MAX_WALLS)
     return out
 
 
-def _pattern(doi: float, rng: np.random.Generator) -> Array:
+def draw_pattern(doi: float, rng: np.random.Generator) -> Array:
     """K_0 to K_359 (Eq. 4.4); drawn until it closes, which about one in thirty does."""
     for _ in range(_MOST_DRAWS):
         steps = rng.weibull(1.0, 359) * np.where(rng.random(359) < 0.5, -1.0, 1.0) * doi
