@@ -7,13 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from wayfuse.core.errors import ConfigError
 from wayfuse.simulator.barometer import BarometerModel
 from wayfuse.simulator.imu import ImuModel
 from wayfuse.simulator.journeys import Trip
 from wayfuse.simulator.passages import Activity
 from wayfuse.simulator.scanner import ScannerModel, between_floors
-from wayfuse.simulator.scenario import Scenario, load_scenario
+from wayfuse.simulator.scenario import Scenario
 from wayfuse.simulator.simulate_journey import Phone, simulate_journey, simulate_stay
 
 HEIGHT = 4.42  # m
@@ -205,23 +204,3 @@ def test_the_phone_tracked_hears_less_by_band_where_the_scenario_says_so():
     scenario = Scenario(tracked_offset_db=(-4.0, -2.0), scanner=ScannerModel(device_offset_db=(1.0, 1.0)))
     assert scenario.tracked().scanner.device_offset_db == (-3.0, -1.0)
     assert scenario.tracked().imu == scenario.imu
-
-
-def test_a_scenario_file_names_the_new_parts(tmp_path):
-    path = tmp_path / "s.toml"
-    path.write_text(
-        "changes = 3\ntracked_offset_db = [-6.0, -2.0]\n[barometer]\nrate_hz = 5.0\n[lift]\nspeed = 1.6\n"
-    )
-    scenario = load_scenario(path)
-    assert (scenario.changes, scenario.tracked_offset_db) == (3, (-6.0, -2.0))
-    assert (scenario.barometer.rate_hz, scenario.lift.speed) == (5.0, 1.6)
-
-
-@pytest.mark.parametrize(
-    "table", ["changes = -1", "[barometer]\nrate_hz = -1.0", "[lift]\nspeed = 0.0", "visit_m = [9.0, 3.0]"]
-)
-def test_a_scenario_that_cannot_be_is_refused(tmp_path, table):
-    path = tmp_path / "s.toml"
-    path.write_text(table)
-    with pytest.raises(ConfigError):
-        load_scenario(path)

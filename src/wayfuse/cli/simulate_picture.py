@@ -44,6 +44,8 @@ def write_picture(path: Path, site: Site, world: World, done: Sequence[WalkFiles
         figsize=(_PANEL * columns, height * rows + _FOOT), facecolor="white", layout="constrained"
     )
     FigureCanvasAgg(figure)
+    if (engine := figure.get_layout_engine()) is not None:
+        engine.set(h_pad=0.08, w_pad=0.08)  # type: ignore[call-arg]
     for k, floor in enumerate(floors):
         ax = figure.add_subplot(rows, columns, k + 1)
         draw_floor(ax, floor, names=False)

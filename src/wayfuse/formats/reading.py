@@ -13,9 +13,11 @@ __all__ = ["FORMATS", "expand", "read", "sniff"]
 
 FORMATS = (
     "ms-indoor", "getsensordata", "sensor-logger", "hcu", "wifi-rtt", "intel5300", "nexmon", "esp32-csi",
+    "wayfuse",
 )  # fmt: skip
 _OF_FOLDERS = {"sensor-logger", "hcu"}
 _HEAD_BYTES = 1 << 16
+_WAYFUSE = b'{"wayfuse-log":'  # how `wayfuse.formats.wayfuse_log` begins
 _MS_INDOOR = re.compile(rb"^\d{13}\tTYPE_[A-Z]", re.MULTILINE)
 _GETSENSORDATA = re.compile(
     rb"^% LogFile created by the 'GetSensorData'|^(?:ACCE|GYRO|MAGN|PRES|AHRS|WIFI|BLE4|BLUE|POSI|GNSS);\d",
@@ -43,6 +45,10 @@ def read(path: str | Path, *, format: str | None = None, platform: str | None = 
     kind = format if format is not None else sniff(path)
     if path.is_dir() and kind in FORMATS and kind not in _OF_FOLDERS:
         raise FormatError(f"a folder, where {kind} is a file", where=path)
+    if kind == "wayfuse":
+        from wayfuse.formats import wayfuse_log
+
+        return wayfuse_log.read(path)
     if kind == "ms-indoor":
         from wayfuse.formats import ms_indoor
 
@@ -155,6 +161,8 @@ def _sniff(path: Path) -> str | None:
     if not path.is_dir():
         with path.open("rb") as file:
             head = file.read(_HEAD_BYTES)
+        if head.startswith(_WAYFUSE):
+            return "wayfuse"
         if head.startswith(b"#\tstartTime:") or _MS_INDOOR.search(head):
             return "ms-indoor"
         if _GETSENSORDATA.search(head):

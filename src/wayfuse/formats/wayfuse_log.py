@@ -20,9 +20,8 @@ from wayfuse.sensors.quality import ReadReport
 from wayfuse.sensors.recording import Device, Recording, Series
 from wayfuse.sensors.records import BleReading, CsiFrame, Range, Waypoint, WifiScan, bssid_id
 
-__all__ = ["MARK", "read"]
+__all__ = ["read"]
 
-MARK = b'{"wayfuse-log":'  # how a file begins
 _VERSION = 1
 _WIDTHS = {"acceleration": 3, "rotation_rate": 3, "magnetic_field": 3, "pressure": 1, "orientation": 4}
 _EVENTS = {"wifi": "wifi", "ble": "ble", "range": "ranges", "csi": "csi", "waypoint": "waypoints"}

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from wayfuse.core.types import Array
+from wayfuse.simulator.toml_tables import no_negative, require
 from wayfuse.simulator.walker import GRID_HZ, Walk
 
 __all__ = ["BarometerModel", "PressureSamples", "measure_pressure"]
@@ -34,6 +35,10 @@ class BarometerModel:
     weather_hpa: float = 5.0  # of it, between walks; measured 34 m between sessions
     phone_hpa: float = 0.5  # offset of a phone; measured 4 m between two
     step_hpa: float = 0.000244  # resolution, 1/4096 hPa: usual for MEMS barometers
+
+    def __post_init__(self) -> None:
+        no_negative(self)
+        require("sea_hpa, step_hpa", min(self.sea_hpa, self.step_hpa) > 0.0, self.sea_hpa, "must be positive")
 
 
 @dataclass(frozen=True, slots=True, eq=False)

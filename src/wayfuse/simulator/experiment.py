@@ -19,6 +19,7 @@ from wayfuse.sensors.recording import Recording
 from wayfuse.sensors.records import Waypoint
 from wayfuse.simulator.building import Building, shopping_centre
 from wayfuse.simulator.channel_state import measure_channels
+from wayfuse.simulator.errands import errands
 from wayfuse.simulator.given_way import given_journey
 from wayfuse.simulator.hall import hall
 from wayfuse.simulator.house_site import site_of
@@ -234,7 +235,8 @@ def _stay(
     rng: np.random.Generator,
     visits: np.ndarray | None,
 ) -> Journey:
-    return stay(
+    is_net = bool(world.scenario.site.folder) or not world.building.storeys[floor].rooms
+    return (errands if is_net else stay)(
         world.building,
         floor,
         numbers.way_length(person, rng),

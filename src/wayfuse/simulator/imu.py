@@ -17,6 +17,7 @@ from wayfuse.core.types import Array, IntArray
 from wayfuse.simulator.fields import WaveField, smooth_field
 from wayfuse.simulator.passages import Activity
 from wayfuse.simulator.rotation import about_axis, multiply, rates, to_device
+from wayfuse.simulator.toml_tables import no_negative, require
 from wayfuse.simulator.walker import GRID_HZ, Person, Walk, WalkerModel, smooth
 
 __all__ = ["ImuModel", "ImuSamples", "MagneticField", "magnetic_field", "measure"]
@@ -71,6 +72,13 @@ class ImuModel:
     field_step_ut: float = 0.5996704  # µT, resolution (AK09911)
     compass_time: float = 4.0  # s in which the rotation vector follows the magnetometer
     level_sigma: float = 0.01  # rad, error of its tilt
+
+    def __post_init__(self) -> None:
+        no_negative(self, but=("roll", "hold", "dip"))
+        steps = self.rate_hz, self.accel_step, self.gyro_step, self.field_step_ut
+        require("rate_hz and the resolutions (_step)", min(steps) > 0.0, steps, "must be positive")
+        times = self.drift_time, self.compass_time, self.disturbance_m
+        require("drift_time, compass_time, disturbance_m", min(times) > 0.0, times, "must be positive")
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -20,11 +20,12 @@ from numpy.typing import NDArray
 
 from wayfuse.core.types import Array, BoolArray, IdArray, IntArray
 from wayfuse.simulator.building import Building, Storey
+from wayfuse.simulator.chu2009_world import draw_pattern
 from wayfuse.simulator.fields import WaveField, exponential_field
 from wayfuse.simulator.geometry import clearance, crossings, inside
 from wayfuse.simulator.he2014_world import Room as EmptyRoom
 from wayfuse.simulator.he2014_world import strength
-from wayfuse.simulator.rim import RimModel, draw_pattern, pattern_at, rim_level
+from wayfuse.simulator.rim import RimModel, pattern_at, rim_level
 from wayfuse.simulator.toml_tables import no_negative, require
 
 __all__ = ["PHONE_HEIGHT", "AccessPoint", "RadioField", "RadioModel", "changed", "radio_field"]
@@ -80,7 +81,8 @@ class RadioModel:
         shares = self.house_share, self.single_band_share, self.shadow_shared
         require("house_share, single_band_share, shadow_shared", max(shares) <= 1.0, shares, "from 0 to 1")
         require("shadow_m", self.shadow_m > 0.0, self.shadow_m, "a positive length in m")
-        require("ceiling", self.ceiling > max(self.ap_height, PHONE_HEIGHT), self.ceiling, "above ap_height")
+        fits = self.model != "images" or self.ceiling > max(self.ap_height, PHONE_HEIGHT)
+        require("ceiling", fits, self.ceiling, "above ap_height")
         require("permittivity", self.permittivity >= 1.0, self.permittivity, "at least 1")
 
 

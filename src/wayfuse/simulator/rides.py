@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from wayfuse.core.types import Array
+from wayfuse.simulator.toml_tables import no_negative, require
 
 __all__ = ["LiftModel", "ride"]
 
@@ -25,6 +26,11 @@ class LiftModel:
     )  # from standing in the cabin to the start, and from the stop to the exit
     escalator_speed: float = 0.5  # m/s along its slope: usual
     loss_db: tuple[float, float] = (12.0, 15.0)  # of the closed cabin, at 2.4 and 5 GHz
+
+    def __post_init__(self) -> None:
+        no_negative(self)
+        moved = self.speed, self.acceleration[0], self.jerk, self.escalator_speed
+        require("speeds, acceleration and jerk", min(moved) > 0.0, moved, "must be positive")
 
 
 def ride(rise: float, acceleration: float, model: LiftModel, step: float) -> Array:

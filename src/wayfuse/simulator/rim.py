@@ -4,9 +4,9 @@ r"""The radio irregularity model of chu2009, Eq. 4.1-4.5: a transmitter that is 
           K_0 = 1, \quad K_i = K_{i-1} \pm W \cdot DOI, \quad |K_0 - K_{359}| \le DOI
 
 i is the azimuth in whole degrees (interpolated between), W a Weibull variable. Eq. 4.4 calls W zero-mean, which no
-Weibull variable is: it gets a random sign; its parameters are not given: shape and scale 1. A pattern is drawn until it
-closes.
-The noise of a reading, the last term of Eq. 4.5, is the scanner's (`ScannerModel.fading_db`).
+Weibull variable is: it gets a random sign; its parameters are not given: shape and scale 1. A pattern is drawn until
+it closes (`wayfuse.simulator.chu2009_world.draw_pattern`). The noise of a reading, the last term of Eq. 4.5, is the
+scanner's (`ScannerModel.fading_db`).
 
 References
 ----------
@@ -22,9 +22,8 @@ import numpy as np
 from wayfuse.core.types import Array
 from wayfuse.simulator.toml_tables import no_negative, require
 
-__all__ = ["RimModel", "draw_pattern", "pattern_at", "rim_level"]
+__all__ = ["RimModel", "pattern_at", "rim_level"]
 
-_BATCH, _MOST_BATCHES = 64, 400
 _DEGREES = 360
 
 
@@ -43,20 +42,6 @@ class RimModel:
     def __post_init__(self) -> None:
         no_negative(self, but=("power_dbm",))
         require("doi", self.doi <= 0.1, self.doi, "at most 0.1: beyond it a pattern means nothing")
-
-
-def draw_pattern(doi: float, rng: np.random.Generator) -> Array:
-    """K_0 to K_359 (360,) of one transmitter (Eq. 4.4), drawn until they close (about one in thirty does)."""
-    if doi == 0.0:
-        return np.ones(_DEGREES)
-    for _ in range(_MOST_BATCHES):
-        shape = (_BATCH, _DEGREES - 1)
-        turn = np.where(rng.random(shape) < 0.5, -doi, doi) * rng.weibull(1.0, shape)
-        course = np.cumsum(turn, axis=1)
-        closed = np.flatnonzero(np.abs(course[:, -1]) <= doi)
-        if len(closed):
-            return np.concatenate([[1.0], 1.0 + course[closed[0]]])
-    raise AssertionError("no pattern of twenty thousand closes")  # chance 0.97 ** 25600
 
 
 def pattern_at(pattern: Array, azimuth: Array) -> Array:

@@ -18,7 +18,7 @@ from wayfuse.core.types import Array, BoolArray, IntArray
 from wayfuse.maps.connectors import Connector, ConnectorKind, Landing
 from wayfuse.maps.site import Floor, Site
 from wayfuse.simulator.building import Building, Room, Storey, box
-from wayfuse.simulator.geometry import crossings
+from wayfuse.simulator.geometry import crossings, inside
 from wayfuse.simulator.passages import RISER, TREAD, Activity, Passage, Stretch, escalator, lift, stairway
 
 __all__ = ["building_of"]
@@ -28,6 +28,10 @@ _KEEP_OFF = 0.6  # m from what is not walkable
 _CHECK = 0.25  # m, a way is checked this often
 _CHUNK = 400  # ways whose crossings with all walls are checked at once
 _CABIN = 1.0  # m, half a lift's cabin where the plan has no footprint
+_TRIED, _CLOSED = (
+    12,
+    0.3,
+)  # places tried per axis of a unit, and the share that may be walkable in a closed one
 _ALIKE = 0.5  # landings nearer than this share of a flight lie above each other
 
 
@@ -67,12 +71,25 @@ def _storey(floor: Floor, elevation: float, to_site: Array, landings: list[Landi
         name=floor.name,
         elevation=elevation,
         outline=outline + to_site,
-        rooms=(),  # what of a plan's units is closed to walkers only its walkable space says
+        rooms=tuple(
+            Room(u.name, u.polygon.exterior[:-1] + to_site)
+            for u in floor.units
+            if u.category != "void" and _is_closed(floor, u.polygon.exterior[:-1])
+        ),
         voids=voids,
         walls=floor.walls + np.tile(to_site, 2),
         nodes=nodes + to_site,
         edges=edges,
     )
+
+
+def _is_closed(floor: Floor, polygon: Array) -> bool:
+    """Whether a unit is closed to walkers: hardly any of it is walkable."""
+    low, high = polygon.min(axis=0), polygon.max(axis=0)
+    step = np.linspace(0.05, 0.95, _TRIED)
+    places = np.stack(np.meshgrid(*(low + step[:, None] * (high - low)).T), axis=-1).reshape(-1, 2)
+    places = places[inside(polygon, places)]
+    return bool(len(places)) and bool(floor.walkable.contains(*places.T).mean() < _CLOSED)
 
 
 def _net(floor: Floor, landings: Array) -> tuple[Array, IntArray]:

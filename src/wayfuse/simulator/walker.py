@@ -15,6 +15,7 @@ import numpy as np
 from wayfuse.core.angles import wrap
 from wayfuse.core.types import Array, IntArray
 from wayfuse.simulator.routes import Route
+from wayfuse.simulator.toml_tables import no_negative, require
 
 __all__ = [
     "GRID_HZ",
@@ -52,6 +53,11 @@ class WalkerModel:
     leg_length: float = 0.9  # m
     up_rate: float = 0.96  # of the level step rate, climbing; 1.58 to 1.76 Hz in the stairs logs of ipin2023
     down_rate: float = 1.0  # the same, descending: 1.68 to 1.82 Hz there
+
+    def __post_init__(self) -> None:
+        no_negative(self)
+        moved = self.step_rate, self.step_length, self.up_rate, self.down_rate, self.leg_length
+        require("rates and lengths", min(moved) > 0.0, moved, "must be positive")
 
 
 @dataclass(frozen=True, slots=True)
