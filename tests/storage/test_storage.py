@@ -160,12 +160,21 @@ def test_checkpoints_and_estimates_come_back_to_the_bit(engine: Engine) -> None:
     assert last_seq(engine) == 18  # though the log is empty
     assert store.state("t") == (row._replace(heard=9.0), b"two")
     assert store.state("nobody") is None
-    assert store.estimates("t") == first + second
-    assert store.estimates("t", since=2.0, until=2.5) == first[1:]
+    assert store.estimates("t") == list(enumerate(first + second))
+    assert store.estimates("t", since=2.0, until=2.5) == [(1, first[1])]
+    assert store.n_estimates("t") == 3
+    assert store.row("t") == row._replace(heard=9.0)
+    assert store.row("nobody") is None
     assert store.last_estimate("t") == second[0]
     assert store.last_estimate("u") is None
     assert [r.track for r in store.newest()] == ["t", "u"]
     assert [r.track for r in store.newest(heard_after=7.0)] == ["t"]
+    assert [r.track for r in store.newest(limit=1)] == ["t"]
+    assert store.newest(site="elsewhere") == []
+    assert store.trim(7.0) == 1
+    assert [r.track for r in store.newest()] == ["t"]
+    store.save(19, [Checkpoint(row, 0, second, b"anew")])  # begun anew: what was is replaced
+    assert store.estimates("t") == [(0, second[0])]
 
 
 def test_a_round_is_written_whole_or_not_at_all(engine: Engine) -> None:

@@ -61,7 +61,10 @@ class _Waiting(NamedTuple):
 
 
 class Pipeline:
-    """The thread. ``clock`` gives Unix s; ``publish`` is called, in the thread, with what a group changed."""
+    """The thread.
+
+    clock : gives Unix s. publish : called, in the thread, with what a group changed and the seq of its last entry.
+    """
 
     def __init__(
         self,
@@ -71,7 +74,7 @@ class Pipeline:
         next_seq: int,
         *,
         clock: Callable[[], float],
-        publish: Callable[[list[Applied]], None],
+        publish: Callable[[list[Applied], int], None],
         config: PipelineConfig | None = None,
     ) -> None:
         self.applied = next_seq - 1  # seq of the last entry that is in the tracks
@@ -188,7 +191,7 @@ class Pipeline:
             if applied is not None:
                 changes.append(applied)
             self.applied = item.entry.seq
-        self._publish(changes)
+        self._publish(changes, self.applied)
 
     def _checkpoint(self) -> None:
         now = self._clock()
@@ -204,10 +207,18 @@ class Pipeline:
         self._live.release(now - self._config.idle)
 
 
-def recover(log: IngestLog, live: Live, tracks: TrackStore, now: float, idle: float) -> int:
+def recover(
+    log: IngestLog,
+    live: Live,
+    tracks: TrackStore,
+    now: float,
+    idle: float,
+    told: Callable[[Applied], None],
+) -> int:
     """Bring tracks back as they were: recent checkpoints, then the log after them. How many entries were read again.
 
-    A recent track whose checkpoint is of another version is made again from what the log still has of it.
+    A recent track whose checkpoint is of another version is made again from what the log still has of it. ``told`` is
+    called with what the entries after the checkpoint changed, as it was when they first came.
     """
     kept, n = tracks.round(), 0
     for row in tracks.newest(heard_after=now - idle):
@@ -217,6 +228,8 @@ def recover(log: IngestLog, live: Live, tracks: TrackStore, now: float, idle: fl
                     live.apply(entry)
                     n += 1
     for entry in log.read(after=kept):
-        live.apply(entry)
+        applied = live.apply(entry)
+        if applied is not None:
+            told(applied)
         n += 1
     return n

@@ -9,7 +9,7 @@ from typing import Any
 from wayfuse.maps.site import Site
 from wayfuse.tracking.estimate import Estimate
 
-__all__ = ["collection", "feature"]
+__all__ = ["Json", "collection", "feature"]
 
 Json = dict[str, Any]
 

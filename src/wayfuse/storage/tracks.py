@@ -69,23 +69,31 @@ class TrackStore:
             ).scalar()
         return None if row is None or state is None else (TrackRow(*row), bytes(state))
 
-    def newest(self, heard_after: float = 0.0, *, device: str | None = None) -> list[TrackRow]:
-        """Tracks heard after a time, the last heard first."""
-        query = select(tracks).where(tracks.c.heard > heard_after).order_by(tracks.c.heard.desc())
-        if device is not None:
-            query = query.where(tracks.c.device == device)
+    def row(self, track: str) -> TrackRow | None:
+        """A track."""
         with self._engine.connect() as connection:
-            return [TrackRow(*row) for row in connection.execute(query)]
+            found = connection.execute(select(tracks).where(tracks.c.track == track)).first()
+        return None if found is None else TrackRow(*found)
 
-    def estimates(self, track: str, since: float | None = None, until: float | None = None) -> list[Estimate]:
-        """Settled estimates in time order, of a span of the phone's time."""
-        query = select(*_COLUMNS).where(estimates.c.track == track).order_by(estimates.c.n)
+    def newest(self, heard_after: float = 0.0, *, limit: int | None = None, site: str = "") -> list[TrackRow]:
+        """Tracks heard after a time, of a site or all, the last heard first."""
+        query = select(tracks).where(tracks.c.heard > heard_after).order_by(tracks.c.heard.desc())
+        if site:
+            query = query.where(tracks.c.site == site)
+        with self._engine.connect() as connection:
+            return [TrackRow(*row) for row in connection.execute(query.limit(limit))]
+
+    def estimates(
+        self, track: str, since: float | None = None, until: float | None = None
+    ) -> list[tuple[int, Estimate]]:
+        """Settled estimates with their numbers, in order, of a span of the phone's time."""
+        query = select(estimates.c.n, *_COLUMNS).where(estimates.c.track == track).order_by(estimates.c.n)
         if since is not None:
             query = query.where(estimates.c.t >= since)
         if until is not None:
             query = query.where(estimates.c.t <= until)
         with self._engine.connect() as connection:
-            return [_estimate(row) for row in connection.execute(query)]
+            return [(row[0], _estimate(row[1:])) for row in connection.execute(query)]
 
     def last_estimate(self, track: str) -> Estimate | None:
         """The last settled estimate."""
@@ -93,6 +101,20 @@ class TrackStore:
         with self._engine.connect() as connection:
             row = connection.execute(query).first()
         return None if row is None else _estimate(row)
+
+    def n_estimates(self, track: str) -> int:
+        """How many estimates of a track are written."""
+        query = select(func.count()).select_from(estimates).where(estimates.c.track == track)
+        with self._engine.connect() as connection:
+            return int(connection.execute(query).scalar_one())
+
+    def trim(self, heard_before: float) -> int:
+        """Delete tracks last heard before a time (Unix s); how many."""
+        with self._engine.begin() as connection:
+            old = select(tracks.c.track).where(tracks.c.heard < heard_before)
+            connection.execute(delete(checkpoints).where(checkpoints.c.track.in_(old)))
+            connection.execute(delete(estimates).where(estimates.c.track.in_(old)))
+            return int(connection.execute(delete(tracks).where(tracks.c.heard < heard_before)).rowcount)
 
     def forget(self, device: str) -> int:
         """Delete all of a phone, its part of the log too; how many tracks it had."""
@@ -133,4 +155,4 @@ def _save(connection: Connection, seq: int, kept: Checkpoint) -> None:
 
 def _estimate(row: Any) -> Estimate:
     e = Estimate(*row)
-    return e._replace(state=State(row.state))
+    return e._replace(state=State(e.state))

@@ -1,0 +1,72 @@
+"""``wayfuse serve``: phones and anchors in, positions out, in one process."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+__all__ = ["serve"]
+
+
+@click.command(context_settings={"help_option_names": ["-h", "--help"]})
+@click.argument("site_folders", metavar="SITE...", nargs=-1, required=True, type=click.Path(path_type=Path))
+@click.option(
+    "--radio-map",
+    "radio_maps",
+    multiple=True,
+    type=click.Path(path_type=Path),
+    help="From `wayfuse survey build`; published at once. One per site; without, upload one later.",
+)
+@click.option("--config", type=click.Path(path_type=Path), help="TOML file of settings (docs/server.md).")
+@click.option("--host", help="Address to listen on; 0.0.0.0 for all.  [default: 127.0.0.1]")
+@click.option("--port", type=click.IntRange(0, 65535), help="0: any free one.  [default: 8080]")
+@click.option("--data", help="Folder of the database and the key of the pseudonyms.  [default: wayfuse-data]")
+@click.option("--database", help="URL of a PostgreSQL database, instead of SQLite in the data folder.")
+@click.option(
+    "--new-admin-token", is_flag=True, help="Make another administrator's token: the first is lost."
+)
+def serve(
+    site_folders: tuple[Path, ...],
+    radio_maps: tuple[Path, ...],
+    config: Path | None,
+    host: str | None,
+    port: int | None,
+    data: str | None,
+    database: str | None,
+    new_admin_token: bool,
+) -> None:
+    """Serve live positions in SITE... over HTTP.
+
+    Phones post their records, tracks come out as GeoJSON, as a stream of events, and on the page at `/`. At the first
+    start an administrator's token is printed, once; it makes the tokens of phones and readers.
+
+    Settings come from the options, the environment (`WAYFUSE_SERVER_PORT=8443`), the file of --config, in this order.
+    """
+    import os
+    import secrets
+    import time
+
+    from wayfuse.core.errors import UsageError
+
+    try:
+        from wayfuse.service.run import serve as run
+        from wayfuse.service.server import Server, match_radio_maps
+    except ModuleNotFoundError as error:
+        raise UsageError(
+            f"the server needs the package {error.name}", remedy="pip install 'wayfuse[server]'"
+        ) from error
+    from wayfuse.service.settings import load_settings
+
+    given = {"host": host, "port": port, "data": data, "database": database}
+    settings = load_settings(config, os.environ, given)
+    sites = match_radio_maps(site_folders, radio_maps)
+    server = Server(settings, sites, clock=time.time, random=secrets.token_bytes)
+    token = server.first_admin_token(anew=new_admin_token)
+    if token is not None:
+        click.echo(f"administrator's token, shown this once: {token}")
+    for name in server.worlds:
+        if server.published(name) is None:
+            note = f"note: site {name} has no radio map yet; its phones are refused until one is published"
+            click.echo(note, err=True)
+    run(server, lambda address: click.echo(f"serving {', '.join(server.worlds)} at {address}"))

@@ -1,0 +1,64 @@
+"""The application: routes, answers to errors, headers, and the life of the server with it."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager, suppress
+
+from fastapi import FastAPI
+from fastapi.concurrency import run_in_threadpool
+from sqlalchemy.exc import SQLAlchemyError
+
+from wayfuse import __version__
+from wayfuse.service.problems import handle_problems
+from wayfuse.service.routes import admin, inputs, outputs, pages, stream
+from wayfuse.service.security import SecurityHeaders
+from wayfuse.service.server import Server
+
+__all__ = ["create_app"]
+
+_log = logging.getLogger(__name__)
+_CLEAN_S = 600.0  # between deletions of what is too old
+
+
+def create_app(server: Server) -> FastAPI:
+    """The application of a server; it starts and stops the server's work."""
+
+    @asynccontextmanager
+    async def life(_app: FastAPI) -> AsyncIterator[None]:
+        n = await run_in_threadpool(server.start, asyncio.get_running_loop())
+        if n:
+            _log.info("%d entries of the log read again", n)
+        cleaning = asyncio.create_task(_clean(server))
+        yield
+        cleaning.cancel()
+        with suppress(asyncio.CancelledError):
+            await cleaning
+        server.hub.close()
+        await run_in_threadpool(server.stop)
+
+    app = FastAPI(
+        title="wayfuse",
+        version=__version__,
+        summary="Live indoor positions: phones and anchors in, positions out.",
+        lifespan=life,
+        docs_url=None,  # both would load scripts from another host
+        redoc_url=None,
+    )
+    app.state.server = server
+    for part in (inputs, outputs, stream, admin, pages):
+        app.include_router(part.router)
+    handle_problems(app)
+    app.add_middleware(SecurityHeaders)
+    return app
+
+
+async def _clean(server: Server) -> None:
+    while True:
+        await asyncio.sleep(_CLEAN_S)
+        try:
+            await run_in_threadpool(server.clean)
+        except SQLAlchemyError as error:
+            _log.error("old data cannot be deleted now: %s", type(error).__name__)

@@ -1,0 +1,196 @@
+"""Positions and tracks, asked for."""
+
+from __future__ import annotations
+
+import math
+import re
+import time
+from typing import Annotated, Any, Literal
+
+from fastapi import APIRouter, Depends, Query, Request
+from fastapi.responses import Response
+
+from wayfuse.service.access import SCHEME, allowed, server_of, site_of
+from wayfuse.service.export import to_csv, to_gpx
+from wayfuse.service.live import View
+from wayfuse.service.positions import collection, feature
+from wayfuse.service.problems import Problem, responses
+from wayfuse.service.routes.examples import POSITION
+from wayfuse.service.server import Server
+from wayfuse.storage.tokens import Token
+from wayfuse.storage.tracks import TrackRow
+from wayfuse.tracking.estimate import Estimate
+
+__all__ = ["router"]
+
+router = APIRouter(
+    prefix="/api/v1", tags=["out"], dependencies=[Depends(SCHEME)], responses=responses(401, 403, 422, 429)
+)
+
+Reader = Annotated[Token, Depends(allowed("read"))]
+Site = Annotated[str, Query(max_length=200, description="Of this site alone.")]
+Time = Annotated[float | None, Query(description="s, of the phone's clock.", allow_inf_nan=False)]
+_MOST = 10_000
+_TRACK = re.compile("[0-9a-f]{16}")  # databases refuse some characters
+_FEATURES: dict[int | str, dict[str, Any]] = {
+    200: {"content": {"application/json": {"example": {"type": "FeatureCollection", "features": [POSITION]}}}}
+}
+_MEDIA = {"csv": "text/csv; charset=utf-8", "gpx": "application/gpx+xml"}
+
+
+@router.get("/sites", summary="Sites that are served")
+def sites(request: Request, token: Reader) -> dict[str, Any]:
+    """Names, levels and versions of the radio maps."""
+    server = server_of(request)
+    return {
+        "sites": [
+            {
+                "name": name,
+                "levels": list(world.site.floor_names),
+                "radio_map": server.published(name),
+                "tracks": len(server.live.views(name)),
+            }
+            for name, world in server.worlds.items()
+            if token.site in {"", name}
+        ]
+    }
+
+
+@router.get("/positions", summary="Where everybody is", responses=_FEATURES)
+def positions(request: Request, token: Reader, site: Site = "") -> dict[str, Any]:
+    """GeoJSON of the latest position of every track in memory."""
+    server = server_of(request)
+    wanted = _wanted(server, token, site)
+    features = [f for v in server.live.views(wanted) if (f := server.feature(v)) is not None]
+    return {**collection(features), "seq": _applied(server)}
+
+
+@router.get("/tracks", summary="Tracks, the last heard first")
+def tracks(
+    request: Request,
+    token: Reader,
+    site: Site = "",
+    device: Annotated[str, Query(max_length=200, description="Pseudonym of a phone.")] = "",
+    limit: Annotated[int, Query(ge=1, le=_MOST)] = 100,
+) -> dict[str, Any]:
+    """Tracks that are kept, live ones and older ones, with the counters of those that are live."""
+    server = server_of(request)
+    wanted = _wanted(server, token, site)
+    views = {v.row.track: v for v in server.live.views(wanted)}
+    rows = {r.track: r for r in server.tracks.newest(limit=limit, site=wanted)} | {
+        k: v.row for k, v in views.items()
+    }
+    of = [r for r in rows.values() if not device or r.device == device]
+    newest = sorted(of, key=lambda r: (-r.heard, r.track))[:limit]
+    return {"tracks": [_summary(r, views.get(r.track)) for r in newest]}
+
+
+@router.get("/tracks/{track}", summary="One track, with its counters", responses=responses(404))
+def track(request: Request, token: Reader, track: str) -> dict[str, Any]:
+    """What is known of a track besides its places."""
+    server = server_of(request)
+    row = _row(server, token, track)
+    return _summary(row, server.live.view(track))
+
+
+@router.get("/tracks/{track}/position", summary="Where somebody is", responses=responses(404))
+def position(request: Request, token: Reader, track: str) -> dict[str, Any]:
+    """GeoJSON of the latest position."""
+    server = server_of(request)
+    row = _row(server, token, track)
+    view = server.live.view(track) or _stored(server, row)
+    found = server.feature(view)
+    if found is None:
+        raise Problem(404, "no position yet", "post a Wi-Fi scan first")
+    return found
+
+
+@router.get("/tracks/{track}/estimates", summary="Where somebody was", responses=responses(404) | _FEATURES)
+def estimates(
+    request: Request,
+    token: Reader,
+    track: str,
+    since: Time = None,
+    until: Time = None,
+    limit: Annotated[int, Query(ge=1, le=_MOST)] = _MOST,
+) -> dict[str, Any]:
+    """GeoJSON of the estimates of a span of time, in order; the newest ``limit`` of them."""
+    server = server_of(request)
+    row = _row(server, token, track)
+    numbered = _estimates(server, row, since, until)[-limit:]
+    site = server.worlds[row.site].site
+    return collection(feature(site, e, {"track": track, "n": n}) for n, e in numbered)
+
+
+@router.get(
+    "/tracks/{track}/export",
+    summary="A track as a file",
+    response_class=Response,
+    responses=responses(404)
+    | {200: {"content": {media: {"schema": {"type": "string"}} for media in _MEDIA.values()}}},
+)
+def export(
+    request: Request,
+    token: Reader,
+    track: str,
+    format: Literal["csv", "gpx"] = "csv",  # noqa: A002 (a word of the address)
+    since: Time = None,
+    until: Time = None,
+) -> Response:
+    """CSV with everything, or GPX 1.1."""
+    server = server_of(request)
+    row = _row(server, token, track)
+    site = server.worlds[row.site].site
+    said = [e for _, e in _estimates(server, row, since, until)]
+    text = to_csv(site, said) if format == "csv" else to_gpx(site, said, track)
+    headers = {"Content-Disposition": f'attachment; filename="{row.track}.{format}"'}
+    return Response(text, media_type=_MEDIA[format], headers=headers)
+
+
+def _wanted(server: Server, token: Token, site: str) -> str:
+    """The site that is asked for; empty for all."""
+    return site_of(server, token, site) if site or token.site else ""
+
+
+def _row(server: Server, token: Token, track: str) -> TrackRow:
+    view = server.live.view(track)
+    row = view.row if view is not None else server.tracks.row(track) if _TRACK.fullmatch(track) else None
+    if row is None or row.site not in server.worlds or token.site not in {"", row.site}:
+        raise Problem(404, "no such track", "list them at /api/v1/tracks")
+    return row
+
+
+def _stored(server: Server, row: TrackRow) -> View:
+    n = server.tracks.n_estimates(row.track)
+    return View(row, server.tracks.last_estimate(row.track), n - 1, float("nan"), {}, is_ended=False)
+
+
+def _estimates(
+    server: Server, row: TrackRow, since: float | None, until: float | None
+) -> list[tuple[int, Estimate]]:
+    """Numbered estimates: those that are written, then those in memory."""
+    first, recent = server.live.recent(row.track)
+    for _ in range(20):  # what has settled is on its way into the database
+        if server.tracks.n_estimates(row.track) >= first:
+            break
+        time.sleep(0.05)
+    written = server.tracks.estimates(row.track, since, until)
+    inside = [
+        (n, e)
+        for n, e in enumerate(recent, first)
+        if (since is None or e.t >= since) and (until is None or e.t <= until)
+    ]
+    return [(n, e) for n, e in written if not recent or n < first] + inside
+
+
+def _summary(row: TrackRow, view: View | None) -> dict[str, Any]:
+    out: dict[str, Any] = row._asdict()
+    out["is_live"] = view is not None
+    if view is not None:
+        out |= {"is_ended": view.is_ended, "estimates": view.number + 1, "counts": dict(view.counts)}
+        out["clock_ahead_s"] = view.ahead if math.isfinite(view.ahead) else None
+    return out
+
+
+def _applied(server: Server) -> int:
+    return server.pipeline.applied if server.pipeline is not None else 0

@@ -1,0 +1,69 @@
+"""The process: a socket, uvicorn, and the application."""
+
+from __future__ import annotations
+
+import logging
+import socket
+from collections.abc import Callable
+
+import uvicorn
+
+from wayfuse.core.errors import UsageError
+from wayfuse.service.app import create_app
+from wayfuse.service.server import Server
+
+__all__ = ["serve"]
+
+_BACKLOG = 2048
+_GRACE_S = 5  # for requests under way, when the server is told to stop
+
+
+def serve(server: Server, ready: Callable[[str], None]) -> None:
+    """Serve until a signal; ``ready`` is called with the address as soon as it takes connections.
+
+    Raises
+    ------
+    UsageError : the address cannot be listened on, or the TLS files cannot be read.
+    """
+    settings = server.settings
+    listener = _listen(settings.host, settings.port)
+    is_tls = bool(settings.tls_certificate)
+    logging.basicConfig(level=logging.WARNING, format="%(asctime)s %(levelname)s %(name)s %(message)s")
+    config = uvicorn.Config(
+        create_app(server),
+        log_config=None,
+        access_log=False,  # addresses hold tokens, and say who asked for whom
+        server_header=False,
+        proxy_headers=False,
+        loop="uvloop",
+        http="httptools",
+        ws="websockets-sansio",
+        ws_max_size=settings.max_body_bytes,
+        timeout_graceful_shutdown=_GRACE_S,
+        ssl_certfile=settings.tls_certificate or None,
+        ssl_keyfile=settings.tls_key or None,
+    )
+    try:
+        config.load()
+    except OSError as error:
+        raise UsageError(f"the TLS files cannot be used: {error}", where="tls_certificate") from error
+    host, port = listener.getsockname()[:2]
+    shown = f"[{host}]" if ":" in host else host
+    ready(f"{'https' if is_tls else 'http'}://{shown}:{port}")
+    uvicorn.Server(config).run(sockets=[listener])
+
+
+def _listen(host: str, port: int) -> socket.socket:
+    try:
+        family = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0][0]
+        listener = socket.socket(family, socket.SOCK_STREAM)
+        listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        listener.bind((host, port))
+        listener.listen(_BACKLOG)
+    except OSError as error:
+        raise UsageError(
+            f"cannot listen on {host}:{port}: {error.strerror or error}",
+            where="--port",
+            remedy="give another --port or --host",
+        ) from error
+    return listener

@@ -1,0 +1,292 @@
+"""A server's parts, put together: database, sites, pipeline, events. Clock and randomness come from outside."""
+
+from __future__ import annotations
+
+import asyncio
+import fcntl
+import json
+import os
+from collections.abc import Callable, Sequence
+from hashlib import sha256
+from pathlib import Path
+from typing import NamedTuple
+
+import msgspec
+
+from wayfuse.core.errors import RadioMapError, UsageError
+from wayfuse.maps.site import Site
+from wayfuse.radio.walk_survey import load
+from wayfuse.service.events import Event, Hub
+from wayfuse.service.identity import Pseudonyms, load_key
+from wayfuse.service.limits import RateLimit
+from wayfuse.service.live import Applied, Live, View
+from wayfuse.service.live_track import LiveConfig
+from wayfuse.service.metrics import Metrics
+from wayfuse.service.pipeline import Pipeline, PipelineConfig, recover
+from wayfuse.service.positions import Json, feature
+from wayfuse.service.security import Authority
+from wayfuse.service.settings import Settings
+from wayfuse.service.world import World, survey_of
+from wayfuse.storage.audit import AuditLog
+from wayfuse.storage.database import open_database, take_lease
+from wayfuse.storage.devices import DeviceStore
+from wayfuse.storage.log import IngestLog, last_seq
+from wayfuse.storage.sites import SiteStore
+from wayfuse.storage.tokens import TokenStore
+from wayfuse.storage.tracks import TrackStore
+
+__all__ = ["Server", "SiteFiles", "match_radio_maps"]
+
+_OPERATOR = "operator"  # who acts where the command line does
+
+
+class SiteFiles(NamedTuple):
+    """A site to serve: its folder, and a radio map to publish, if any."""
+
+    folder: Path
+    radio_map: Path | None = None
+
+
+class Server:
+    """Everything a server has, without the network.
+
+    Parameters
+    ----------
+    clock : Unix s. random : unpredictable bytes.
+
+    Raises
+    ------
+    WayfuseError : a folder, a database or a radio map that cannot be used.
+    """
+
+    def __init__(
+        self,
+        settings: Settings,
+        sites: Sequence[SiteFiles],
+        *,
+        clock: Callable[[], float],
+        random: Callable[[int], bytes],
+    ) -> None:
+        self.settings, self.clock = settings, clock
+        data = Path(settings.data)
+        data.mkdir(mode=0o700, parents=True, exist_ok=True)
+        self._lock = _lock(data)
+        self.pseudonyms = Pseudonyms(load_key(data / "site.key", random))
+        self.engine = open_database(settings.database_url)
+        self._lease = take_lease(self.engine)
+        self.log, self.sites = IngestLog(self.engine), SiteStore(self.engine)
+        self.tracks, self.devices = TrackStore(self.engine), DeviceStore(self.engine)
+        self.tokens, self.audit = TokenStore(self.engine, random), AuditLog(self.engine)
+        self.metrics = Metrics()
+        self._published: dict[str, int] = {}
+        self.authority = Authority(
+            self.tokens, RateLimit(settings.rate_per_s, settings.rate_burst, clock), clock
+        )
+        self.worlds = {world.site.name: world for world in (self._world(files) for files in sites)}
+        config = LiveConfig(rewind=settings.rewind_s, spacing=settings.spacing_s)
+        self.live = Live(self.worlds, self.tracks.state, config, settings.seed)
+        self.hub = Hub(settings.events)
+        self._loop: asyncio.AbstractEventLoop | None = None
+        self.pipeline: Pipeline | None = None
+        self._watch()
+
+    def _world(self, files: SiteFiles) -> World:
+        site = Site.load(files.folder)
+        digest = sha256(json.dumps(dict(site.provenance), sort_keys=True).encode()).hexdigest()
+        self.sites.register(site.name, digest, self.clock())
+        if files.radio_map is not None:
+            archive = files.radio_map.read_bytes()
+            version = self.add_radio_map(site, archive, _OPERATOR, files.radio_map.name)
+            if self.published(site.name) != version:
+                self.publish(site.name, version, _OPERATOR)
+        return World(
+            site,
+            lambda version: self.sites.archive(site.name, version),
+            method=self.settings.method,
+            n_particles=self.settings.particles,
+        )
+
+    def add_radio_map(self, site: Site, archive: bytes, actor: str, note: str) -> int:
+        """Check and keep a radio map; its version.
+
+        Raises
+        ------
+        RadioMapError : it is none, or of another site.
+        """
+        survey_of(site, archive)
+        added = self.sites.add_radio_map(site.name, archive, self.clock(), note)
+        self.audit.add(self.clock(), actor, "add radio map", site.name, f"version {added.version}")
+        return added.version
+
+    def published(self, site: str) -> int | None:
+        """The version of a site's radio map that is in use; remembered until another is published here."""
+        if site not in self._published:
+            version = self.sites.published(site)
+            if version is None:
+                return None
+            self._published[site] = version
+        return self._published[site]
+
+    def publish(self, site: str, version: int, actor: str) -> None:
+        """Put a version of a radio map to use, for tracks that begin from now on.
+
+        Raises
+        ------
+        RadioMapError : there is no such version.
+        """
+        self.sites.publish(site, version, self.clock(), actor)
+        self._published.pop(site, None)
+        self.audit.add(self.clock(), actor, "publish radio map", site, f"version {version}")
+
+    def roll_back(self, site: str, actor: str) -> int:
+        """Put the version before to use; its number.
+
+        Raises
+        ------
+        RadioMapError : there is none.
+        """
+        version = self.sites.roll_back(site, self.clock(), actor)
+        self._published.pop(site, None)
+        self.audit.add(self.clock(), actor, "roll back radio map", site, f"version {version}")
+        return version
+
+    def first_admin_token(self, *, anew: bool = False) -> str | None:
+        """The text of a new token for everything; None where there is one already, unless ``anew``."""
+        if self.tokens.all() and not anew:
+            return None
+        text, made = self.tokens.create({"admin"}, self.clock(), label="administrator")
+        self.audit.add(self.clock(), _OPERATOR, "create token", made.id, "admin")
+        return text
+
+    # --- life
+
+    def start(self, loop: asyncio.AbstractEventLoop | None) -> int:
+        """Read what the log has, then begin to work; how many entries were read again.
+
+        loop : where events are published; None for nowhere.
+        """
+        next_seq = last_seq(self.engine) + 1
+        recovered: list[Event] = []
+        kept = self.tracks.round()
+        n = recover(
+            self.log,
+            self.live,
+            self.tracks,
+            self.clock(),
+            self.settings.idle_s,
+            lambda applied: recovered.append(self._event(applied)),
+        )
+        self.hub = Hub(self.settings.events, kept)
+        self.hub.publish([e for e in recovered if e.id > kept], next_seq - 1)
+        self._loop = loop
+        self.pipeline = Pipeline(
+            self.log,
+            self.live,
+            self.tracks,
+            next_seq,
+            clock=self.clock,
+            publish=self._publish,
+            config=PipelineConfig(
+                max_waiting=self.settings.max_waiting,
+                checkpoint_every=self.settings.checkpoint_s,
+                idle=self.settings.idle_s,
+            ),
+        )
+        self.pipeline.start()
+        return n
+
+    def stop(self) -> None:
+        """Write what waits and let go of everything."""
+        if self.pipeline is not None:
+            self.pipeline.stop()
+        if self._lease is not None:
+            self._lease.close()
+        self.engine.dispose()
+        os.close(self._lock)
+
+    def clean(self) -> None:
+        """Delete what is older than it may be."""
+        now = self.clock()
+        self.log.trim(now - 3600.0 * self.settings.retain_log_h, self.tracks.round())
+        self.tracks.trim(now - 86_400.0 * self.settings.retain_tracks_d)
+
+    def forget(self, device: str) -> int:
+        """Delete all that is kept of a device, by its pseudonym; how many tracks it had."""
+        self.live.forget(device)
+        n = self.tracks.forget(device)
+        self.devices.remove(device)
+        return n
+
+    # --- what comes out
+
+    def feature(self, view: View) -> Json | None:
+        """GeoJSON of a track's latest position; None before the first."""
+        if view.estimate is None or view.row.site not in self.worlds:
+            return None
+        more = {
+            "track": view.row.track,
+            "device": view.row.device,
+            "n": view.number,
+            "heard": view.row.heard,
+            "is_ended": view.is_ended,
+        }
+        return feature(self.worlds[view.row.site].site, view.estimate, more, view.ahead)
+
+    def _event(self, applied: Applied) -> Event:
+        row = applied.view.row
+        body = {"changed": applied.changed, "feature": self.feature(applied.view)}
+        return Event(applied.seq, row.site, row.track, msgspec.json.encode(body))
+
+    def _publish(self, changes: list[Applied], last: int) -> None:
+        now = self.clock()
+        for applied in changes:
+            self.metrics.latency.observe(max(0.0, now - applied.view.row.heard))
+        if self._loop is not None and not self._loop.is_closed():
+            events = [self._event(applied) for applied in changes]
+            self._loop.call_soon_threadsafe(self.hub.publish, events, last)
+
+    def _watch(self) -> None:
+        watch = self.metrics.watch
+        watch("wayfuse_tracks", "Tracks in memory.", lambda: len(self.live.views()))
+        watch("wayfuse_waiting", "Batches that wait to be written.", lambda: self._of_pipeline("n_waiting"))
+        watch(
+            "wayfuse_applied_seq",
+            "Last entry of the log in the tracks.",
+            lambda: self._of_pipeline("applied"),
+        )
+        watch("wayfuse_streams", "Clients that listen to events.", lambda: self.hub.n_clients)
+
+    def _of_pipeline(self, name: str) -> float:
+        return float(getattr(self.pipeline, name)) if self.pipeline is not None else 0.0
+
+
+def match_radio_maps(folders: Sequence[Path], radio_maps: Sequence[Path]) -> list[SiteFiles]:
+    """Each radio map to the site it was made for.
+
+    Raises
+    ------
+    UsageError : two maps of one site, or a map of none of the sites.
+    """
+    of_site: dict[str, Path] = {}
+    for path in radio_maps:
+        site = load(path).site
+        if site in of_site:
+            raise UsageError(f"a second radio map of site {site}", where=path, remedy="give one per site")
+        of_site[site] = path
+    files = [SiteFiles(folder, of_site.pop(Site.load(folder).name, None)) for folder in folders]
+    for site, path in of_site.items():
+        raise RadioMapError(f"radio map of site {site}, which is not served", where=path)
+    return files
+
+
+def _lock(data: Path) -> int:
+    """Hold the data folder against a second server."""
+    handle = os.open(data / "lock", os.O_RDWR | os.O_CREAT, 0o600)
+    try:
+        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError:
+        os.close(handle)
+        raise UsageError(
+            "another server uses this folder", where=data, remedy="stop it, or give another --data"
+        ) from None
+    return handle

@@ -1,0 +1,112 @@
+"""A server in a process of its own, as `wayfuse serve` starts it."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import httpx
+
+__all__ = ["Running", "running", "wait_until"]
+
+_START_S = 60.0
+
+
+@dataclass
+class Running:
+    """The process, its address, and the administrator's token (the one of the first start)."""
+
+    process: subprocess.Popen[str]
+    address: str
+    token: str
+
+    def client(self, **more: Any) -> httpx.Client:
+        """A client that sends the token."""
+        headers = {"Authorization": f"Bearer {self.token}"}
+        return httpx.Client(base_url=self.address, headers=headers, timeout=30.0, trust_env=False, **more)
+
+    def kill(self) -> None:
+        """As a crash would."""
+        self.process.send_signal(signal.SIGKILL)
+        self.process.wait(30)
+
+    def wait_applied(self, seq: int) -> None:
+        """Until everything up to an entry is in the tracks."""
+        with self.client() as client:
+            wait_until(lambda: client.get("/health").json()["applied"] >= seq)
+
+
+def wait_until(is_so: Any, seconds: float = 60.0) -> None:
+    """Ask again and again."""
+    end = time.monotonic() + seconds
+    while not is_so():
+        assert time.monotonic() < end, "waited in vain"
+        time.sleep(0.02)
+
+
+@contextmanager
+def running(
+    folder: Path, data: Path, *options: object, token: str = "", **settings: object
+) -> Iterator[Running]:
+    """A server of the small world in ``folder``; ends with the block."""
+    environment = {k: v for k, v in os.environ.items() if not k.startswith("WAYFUSE_SERVER_")}
+    environment |= {f"WAYFUSE_SERVER_{k.upper()}": str(v) for k, v in settings.items()}
+    command = [
+        sys.executable,
+        "-m",
+        "wayfuse",
+        "serve",
+        folder / "SITE",
+        "--port",
+        0,
+        "--data",
+        data,
+        *options,
+    ]
+    process = subprocess.Popen(
+        list(map(str, command)),
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        env=environment | {"PYTHONUNBUFFERED": "1"},
+    )
+    try:
+        yield _ready(process, token)
+    finally:
+        if process.poll() is None:
+            process.send_signal(signal.SIGTERM)
+        try:
+            out, err = process.communicate(timeout=30)
+        except subprocess.TimeoutExpired:
+            process.kill()
+            out, err = process.communicate()
+            raise AssertionError(f"the server did not stop:\n{out}\n{err}") from None
+        assert "Traceback" not in err, err
+
+
+def _ready(process: subprocess.Popen[str], token: str) -> Running:
+    assert process.stdout is not None
+    for line in process.stdout:
+        if line.startswith("administrator's token"):
+            token = line.split()[-1]
+        if line.startswith("serving "):
+            server = Running(process, line.split()[-1], token)
+            with server.client() as client:
+                wait_until(lambda: _is_up(client), _START_S)
+            return server
+    raise AssertionError(f"the server did not start: {process.communicate()[1]}")
+
+
+def _is_up(client: httpx.Client) -> bool:
+    try:
+        return client.get("/health").status_code == 200
+    except httpx.TransportError:
+        return False
