@@ -92,3 +92,23 @@ def test_a_real_walk_is_without_fault(ms_indoor: Path) -> None:
     assert answer["issues"] == {}
     assert answer["records"]["acceleration"]["rate"] == pytest.approx(50, abs=1)
     assert len(answer["waypoints"]) > 1
+
+
+def test_ranges_and_their_anchors(tmp_path: Path) -> None:
+    sensors = "AccX,AccY,AccZ,GyroX,GyroY,GyroZ,MagX,MagY,MagZ,Azimuth,Pitch,Roll,M1 Ground Truth"
+    columns = "".join(
+        f"AP{k} True Distance (m),AP{k} RTT Distance (m),AP{k} RTT std (m),AP{k} RSS (dBm)," for k in (1, 2)
+    )
+    rows = [
+        f'{500 * k},5,{6 + k},0.1,-60,7,{8 + k},0.1,-70,0,0,9.8,0,0,0,20,5,-40,0,0,0,"[1, 2]"'
+        for k in range(5)
+    ]
+    path = tmp_path / "113.csv"
+    path.write_text(
+        "\n".join([f"M1 Time Stamp (ms),{columns}{sensors}", *rows, "5000,1"]) + "\n", encoding="utf-8"
+    )
+    said = run(path).output
+    for part in ("wifi-rtt, 7 lines", "ranges               10", "anchors     2", "too few columns (line 7)"):
+        assert part in said
+    (answer,) = json.loads(run("--json", path).output)
+    assert (answer["anchors"], answer["records"]["ranges"]["count"], answer["access_points"]) == (2, 10, 0)

@@ -13,7 +13,9 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from wayfuse.core.errors import FormatError
+from wayfuse.formats import intel5300, reading
 from wayfuse.formats.intel5300 import read
+from wayfuse.formats.reading import sniff
 
 # digests of the arrays (n, 30, 3, 3) complex64, antennas that are absent zero, and sums of the received powers (dBm),
 # that csiread 1.4.1 gives for the published logs, in the order of their times
@@ -99,6 +101,19 @@ def test_what_was_written_is_read(
     assert (frame.t, frame.anchor, frame.agc) == (1e-3, 7, 40.0)
     assert np.isnan(frame.noise)
     assert frame.rss == pytest.approx(10.0 * np.log10(1e3 + 10**3.1 + 10**3.2) - 84.0)
+
+
+def test_a_log_is_known_by_its_content(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    good = record(made_up(3, 1))
+    path = written(tmp_path, field(b"a frame", 0xC1), good, good)
+    assert sniff(path) == "intel5300"
+    assert len(reading.read(path).csi) == 2
+    for other in (field(b"a frame", 0xC1) * 90 + good, record(made_up(3, 1), n_rx=9), good[:40], b""):
+        with pytest.raises(FormatError, match="not a recording"):
+            sniff(written(tmp_path, other))
+    monkeypatch.setattr(intel5300, "_MOST_BYTES", 100)
+    with pytest.raises(FormatError, match="larger than"):
+        read(written(tmp_path, good))
 
 
 def test_antennas_come_in_their_own_order(tmp_path: Path) -> None:
