@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pickle
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -71,10 +72,11 @@ def test_the_table_of_section_4() -> None:
 
 
 @pytest.mark.slow
-def test_the_whole_reproduction_in_small() -> None:
+def test_the_whole_reproduction_in_small(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("WAYFUSE_DATA", str(tmp_path))
     result = reproduce((0, 1), in_turn)
     assert {bar.what for bar in result.bars if not bar.met} <= {"fingerprints - fused", "fused, mean error"}
-    assert len(result.tables) == 6
+    assert len(result.tables) == 8
     assert {line.split(":")[0] for line in result.lost} >= {"imu", "sigma_d 0.1"}
 
 

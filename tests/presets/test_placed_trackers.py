@@ -1,16 +1,13 @@
-"""liu2017 and karlsson2015 as trackers: of a simulated world, of one real walk, and what they lack is told."""
+"""liu2017 and karlsson2015 as trackers: a simulated world is tracked, and what they lack is told."""
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
 from wayfuse.core.errors import UsageError
-from wayfuse.evaluation.results_repetitions import Repetitions, gather, key_of
-from wayfuse.models.survey_walk import place_of
 from wayfuse.papers.ipin2023_walks import first_waypoint
 from wayfuse.presets import karlsson2015, karlsson2015_tracker, liu2017, liu2017_tracker
 from wayfuse.radio.ap_estimation import estimate_places
@@ -86,29 +83,3 @@ def test_what_is_missing_is_told(world: Any, name: str) -> None:
     elsewhere = ApPlaces(np.ones(1, np.uint64), np.ones(1), np.ones(1), np.full(1, 9, np.int32), nan)
     with pytest.raises(UsageError, match="on floor 9"):
         build(world.site, None, places=elsewhere)
-
-
-@pytest.fixture(scope="module")
-def museum(data_root: Path) -> Repetitions:
-    """All walks of ipin2023-track3."""
-    folder = data_root / "ipin2023-track3" / "logs"
-    if not folder.is_dir():
-        pytest.skip("REAL DATA ABSENT: `wayfuse datasets fetch ipin2023-track3`")
-    return gather(folder)
-
-
-@pytest.mark.real_data
-@both
-def test_one_real_walk(museum: Repetitions, name: str) -> None:
-    walk = next(r for r in museum.recordings if key_of(r.name) == (1, 1))
-    start = first_waypoint(museum.site, walk)
-    tracker = BUILDS[name][0](museum.site, museum.survey(1), start=start)
-    found = tracker.run(walk).estimates
-    t = np.array([e.t for e in found])
-    off = []
-    for waypoint in walk.waypoints:
-        x, y, _ = place_of(museum.site, waypoint)
-        last = found[max(int(np.searchsorted(t, waypoint.t, side="right")) - 1, 0)]
-        off.append(float(np.hypot(last.x - x, last.y - y)))
-    assert len(off) > 5
-    assert np.mean(off) < 16.0  # of 124 m x 72 m; guessing is 40 m

@@ -44,7 +44,7 @@ def reproduce(seeds: Sequence[int], mapper: Mapper) -> Reproduction:
     tables = (
         _table_1(runs), _table_memory(runs), _table_2(short), _table_3(long), _table_start(long),
         _table_correlation(runs), _table_walk(runs),
-        _table_building(runs), _table_fitted(runs), *real_tables(data_root() / "sodindoorloc"),
+        _table_building(runs), _table_fitted(runs), *real_tables(data_root(), mapper),
     )  # fmt: skip
     return Reproduction(
         "karlsson2015", tuple(seeds), tables, _bars(short, long, runs), (*_lost(short), *_lost(long))

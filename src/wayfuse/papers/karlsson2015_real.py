@@ -7,67 +7,34 @@ without a walk: the most likely place of a grid) on the testing points, with a p
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any
 
 import numpy as np
 
-from wayfuse.core.types import Array, IntArray
-from wayfuse.formats.sodindoorloc import read
-from wayfuse.formats.sodindoorloc_places import WORKBOOK, PlacedAccessPoint, read_places
+from wayfuse.core.types import Array, BoolArray
+from wayfuse.evaluation.results_folds import Mapper
+from wayfuse.maps.site import Site
+from wayfuse.papers.ipin2023_walks import Build, first_waypoint, fused_beside, walk_table
 from wayfuse.papers.reproduction import Interval, Table, mean_interval
+from wayfuse.papers.sodindoorloc_buildings import Building, absent, read_buildings
+from wayfuse.presets import karlsson2015_tracker
+from wayfuse.presets.karlsson2015 import Config
+from wayfuse.radio.ap_hearing import is_5ghz
+from wayfuse.radio.ap_places import ApPlaces
 from wayfuse.radio.band_correlation import SplitErrors, correlate, split_errors
 from wayfuse.radio.path_loss import PathLoss, distances, fit_path_loss, log_likelihood
+from wayfuse.radio.survey import Survey
+from wayfuse.sensors.recording import Recording
+from wayfuse.tracking.tracker import Tracker
 
-__all__ = ["Building", "band_errors", "fix_errors", "read_buildings", "real_tables"]
+__all__ = ["band_errors", "fix_errors", "real_tables", "walks_table"]
 
-_SHEETS = {"CETC331": ("Training_CETC331.csv", "Testing_CETC331.csv"),
-           "SYL": ("Training_SYL_AP_30.csv", "Testing_SYL_AP.csv")}  # fmt: skip
 _LEAST_POINTS = 20  # at which an access point is heard on both bands, to take part
 _GRID = 1.0  # m
 _MARGIN = 3.0  # m round the training points
 _KEPT = {"2.4 and 5 GHz": (0, 1), "2.4 GHz": (0,), "5 GHz": (1,)}
-
-
-class Samples(NamedTuple):
-    """Means of the samples of a point, or the samples: xy (n, 2) m, floor (n,), point (n,), rssi (n, 2, m) dBm."""
-
-    xy: Array
-    floor: IntArray
-    point: IntArray
-    rssi: Array
-
-
-class Building(NamedTuple):
-    """Access points of both bands and the samples of both tables."""
-
-    name: str
-    access_points: tuple[PlacedAccessPoint, ...]
-    training: Samples
-    testing: Samples
-
-
-def read_buildings(root: Path) -> tuple[Building, ...]:
-    """The buildings with access points of both bands; none where the data set is not there."""
-    if not (root / WORKBOOK).is_file():
-        return ()
-    out = []
-    for name, sheets in _SHEETS.items():
-        placed = tuple(ap for ap in read_places(root / WORKBOOK, name) if ap.column_5)
-        training, testing = (_samples(root / name / sheet, placed) for sheet in sheets)
-        out.append(Building(name, placed, training, testing))
-    return tuple(out)
-
-
-def _samples(path: Path, placed: tuple[PlacedAccessPoint, ...]) -> Samples:
-    table = read(path)
-    column = {int(number): k for k, number in enumerate(table.bssid)}
-    silent = np.full(len(table.xy), np.nan)
-    rssi = np.array([
-        [table.rssi[:, column[n]] if n in column else silent for n in (ap.column_24, ap.column_5)] for ap in placed
-    ])  # (m, 2, n)  # fmt: skip
-    _, point = np.unique(np.column_stack([table.xy, table.floor]), axis=0, return_inverse=True)
-    return Samples(table.xy, table.floor, point.ravel(), rssi.transpose(2, 1, 0).astype(np.float64))
 
 
 def band_errors(building: Building) -> list[SplitErrors]:
@@ -87,34 +54,27 @@ def fix_errors(building: Building, keep: tuple[int, ...]) -> Array:
     """Errors (n,) m of the most likely place of the first sample of each testing point, the floor known."""
     errors = []
     for floor in np.unique(building.testing.floor):
-        mine = [a for a, ap in enumerate(building.access_points) if ap.floor == floor]
-        ap_xy = np.array([[building.access_points[a].x, building.access_points[a].y] for a in mine])
-        train, test = (_of_floor(s, int(floor), mine) for s in (building.training, building.testing))
+        mine = building.on(int(floor))
+        ap_xy = building.ap_xy(mine)
+        train, test = (s.of_floor(int(floor), mine) for s in (building.training, building.testing))
         away = distances(train.xy, ap_xy).ravel()
         bands: list[PathLoss] = [fit_path_loss(away, train.rssi[:, b].ravel()) for b in keep]
         low, high = train.xy.min(axis=0) - _MARGIN, train.xy.max(axis=0) + _MARGIN
         axes = np.meshgrid(np.arange(low[0], high[0], _GRID), np.arange(low[1], high[1], _GRID))
         grid = np.column_stack([axis.ravel() for axis in axes])
-        _, first = np.unique(test.point, return_index=True)
-        for k in first:
+        for k in test.first_of_points():
             found = grid[np.argmax(log_likelihood(bands, ap_xy, test.rssi[k][list(keep)], grid))]
             errors.append(float(np.hypot(*(found - test.xy[k]))))
     return np.array(errors)
 
 
-def _of_floor(samples: Samples, floor: int, access_points: list[int]) -> Samples:
-    here = samples.floor == floor
-    rssi = samples.rssi[here][:, :, access_points]
-    return Samples(samples.xy[here], samples.floor[here], samples.point[here], rssi)
-
-
-def real_tables(root: Path) -> tuple[Table, ...]:
-    """The tables on real data, or one that says that they were not measured where the data set is not there."""
-    buildings = read_buildings(root)
+def real_tables(root: Path, mapper: Mapper) -> tuple[Table, ...]:
+    """The tables on real data, or those that say that they were not measured where a data set is not there."""
+    buildings = read_buildings(root / "sodindoorloc", both_bands=True)
+    walks = walks_table(root / "ipin2023-track3" / "logs", mapper)
     if not buildings:
-        why = "`wayfuse datasets fetch sodindoorloc` gets the data set"
-        return (Table("Real data: sodindoorloc", ("not measured",), ((why,),)),)
-    return _correlations(buildings), _fixes(buildings)
+        return Table("Real data: sodindoorloc", ("not measured",), ((absent(),),)), walks
+    return _correlations(buildings), _fixes(buildings), walks
 
 
 def _correlations(buildings: tuple[Building, ...]) -> Table:
@@ -158,4 +118,56 @@ def _fixes(buildings: tuple[Building, ...]) -> Table:
         "Real data: error of a single scan on sodindoorloc (mean, m)", ("building", "points", *_KEPT), tuple(rows),
         "The most likely place of a 1 m grid, the floor known; one path loss per floor and band, fitted to the "
         "training points. Intervals over points.",
+    )  # fmt: skip
+
+
+# --- walks --------------------------------------------------------------------------------------------------
+
+
+def _both(site: Site, survey: Survey, places: ApPlaces, recording: Recording) -> Tracker[Any]:  # noqa: ARG001
+    return karlsson2015_tracker.build(site, survey, places=places)
+
+
+def _as_printed(site: Site, survey: Survey, places: ApPlaces, recording: Recording) -> Tracker[Any]:  # noqa: ARG001
+    config = replace(Config(), offset_sigma=0.0)
+    return karlsson2015_tracker.build(site, survey, places=places, config=config)
+
+
+def _from_start(site: Site, survey: Survey, places: ApPlaces, recording: Recording) -> Tracker[Any]:
+    return karlsson2015_tracker.build(site, survey, places=places, start=first_waypoint(site, recording))
+
+
+def _wifi(site: Site, survey: Survey, places: ApPlaces, recording: Recording) -> Tracker[Any]:  # noqa: ARG001
+    return karlsson2015_tracker.build(site, survey, places=places, use_steps=False)
+
+
+def _lower_band(site: Site, survey: Survey, places: ApPlaces, recording: Recording) -> Tracker[Any]:
+    return _both(site, survey, places.select(~_upper(survey, places)), recording)
+
+
+def _upper_band(site: Site, survey: Survey, places: ApPlaces, recording: Recording) -> Tracker[Any]:
+    return _both(site, survey, places.select(_upper(survey, places)), recording)
+
+
+def _upper(survey: Survey, places: ApPlaces) -> BoolArray:
+    """Which of the places (n,) are of access points of 5 GHz."""
+    return is_5ghz(survey.frequency[survey.columns(places.bssid)])
+
+
+def walks_table(folder: Path, mapper: Mapper) -> Table:
+    """The filter on walks of a museum whose access points have estimated places, beside `fused`."""
+    builds: dict[str, Build] = {
+        "Wi-Fi + steps, start unknown": _both,
+        "Wi-Fi + steps, from the true place": _from_start,
+        "Wi-Fi + steps, levels of the phone known (as printed)": _as_printed,
+        "Wi-Fi + steps, 2.4 GHz alone": _lower_band,
+        "Wi-Fi + steps, 5 GHz alone": _upper_band,
+        "Wi-Fi alone": _wifi,
+        "fused (fingerprints, steps, plan)": fused_beside,
+    }
+    return walk_table(
+        "Real data: walks on one floor of ipin2023-track3 (m)", folder, builds, mapper,
+        "Trials 01-05 and 21-27, error at the waypoints. PLACES AND POWERS OF ACCESS POINTS ARE ESTIMATED from the "
+        "other repetitions, alpha and sigma fitted to them. The heading at the start is unknown throughout. Three "
+        "seeds, intervals over walks.",
     )  # fmt: skip

@@ -10,6 +10,8 @@ import numpy as np
 from wayfuse.core.types import Array
 from wayfuse.evaluation.results_bars import Bar, at_least, at_most, within
 from wayfuse.evaluation.results_folds import Mapper
+from wayfuse.formats.datasets import data_root
+from wayfuse.papers.liu2017_real import real_tables
 from wayfuse.papers.reproduction import Reproduction, Table, mean_interval
 from wayfuse.presets.liu2017 import (
     Config,
@@ -136,11 +138,11 @@ def _sweeps(scene: _Scene) -> dict[str, Array]:
 
 
 def reproduce(seeds: Sequence[int], mapper: Mapper) -> Reproduction:
-    """Run the experiments of Section IV with each seed."""
+    """Run the experiments of Section IV with each seed, and those on real data where present."""
     runs = list(mapper(Runs(), list(seeds), "liu2017"))
     errors = {name: np.array([run[name][0] for run in runs]) for name in runs[0]}
     lost = {name: sum(run[name][1] for run in runs) for name in runs[0]}
-    tables = (_main_table(errors), *_sweep_tables(errors))
+    tables = (_main_table(errors), *_sweep_tables(errors), *real_tables(data_root(), mapper))
     lines = tuple(f"{name}: {n} of {len(runs)} runs" for name, n in lost.items() if n)
     return Reproduction("liu2017", tuple(seeds), tables, _bars(errors), lines)
 
