@@ -168,6 +168,6 @@ def walks_table(folder: Path, mapper: Mapper) -> Table:
     return walk_table(
         "Real data: walks on one floor of ipin2023-track3 (m)", folder, builds, mapper,
         "Trials 01-05 and 21-27, error at the waypoints. PLACES AND POWERS OF ACCESS POINTS ARE ESTIMATED from the "
-        "other repetitions, alpha and sigma fitted to them. The heading at the start is unknown throughout. Three "
-        "seeds, intervals over walks.",
+        "other repetitions, alpha and sigma fitted to them. The heading at the start is unknown throughout. "
+        "Intervals over walks.",
     )  # fmt: skip

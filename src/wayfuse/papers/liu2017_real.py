@@ -198,5 +198,5 @@ def walks_table(folder: Path, mapper: Mapper) -> Table:
     return walk_table(
         "Real data: walks on one floor of ipin2023-track3 (m)", folder, builds, mapper,
         "Trials 01-05 and 21-27, error at the waypoints. PLACES OF ACCESS POINTS ARE ESTIMATED from the other "
-        "repetitions, and so are their powers but in the row that says otherwise. Three seeds, intervals over walks.",
+        "repetitions, and so are their powers but in the row that says otherwise. Intervals over walks.",
     )  # fmt: skip
