@@ -5,14 +5,23 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from wayfuse.cli.results_page_cells import metres, millimetres, percent, signed, span, table, whole, with_unit
+from wayfuse.cli.results_page_cells import (
+    error_table,
+    metres,
+    millimetres,
+    percent,
+    signed,
+    span,
+    table,
+    whole,
+    with_unit,
+)
 from wayfuse.cli.results_page_floors import behaviours, hcu, ipin2023
 
 __all__ = ["page"]
 
 Section = Mapping[str, Any]
 
-_FIGURES = ("mean", "p50", "p75", "p90", "p95")
 _TITLES = {
     "ms-indoor": "Tracking: ms-indoor site1",
     "speed": "CPU time: ms-indoor site1",
@@ -108,37 +117,14 @@ def _tracking(section: Section) -> list[str]:
         ),
     ]
     for name, tables in section["figures"].items():
-        parts += [f"### Errors, {name}", "Once a second:", _errors(tables["1hz"])]
+        parts += [f"### Errors, {name}", "Once a second:", error_table(tables["1hz"], up_to="p95")]
         if name in section["comparisons"]:  # the single folds are there to be seen to agree
-            parts += ["At the waypoints:", _errors(tables["waypoints"])]
+            parts += ["At the waypoints:", error_table(tables["waypoints"], up_to="p95")]
     for name, rows in section["comparisons"].items():
         parts += [f"### Paired differences, {name}", _comparisons(rows)]
     parts += ["### Coverage of the stated radii", _coverage_words(), _coverage(section["coverage"])]
     parts += _splits(section["splits"])
     return [*parts, "### Parameters", *_parameters(section["parameters"])]
-
-
-def _errors(methods: Section) -> str:
-    rows = []
-    for name, of in methods.items():
-        f = of["figures"]
-        row = [name, f"{of['n_walks']}, {of['n']}", *(span(f[k]) for k in _FIGURES)]
-        row += [span(f["floor_accuracy"], percent), span(f["ipin"])]
-        means = of["mean_by_seed"]
-        rows.append([*row, " ".join(map(metres, means)) if len(means) > 1 else ""])
-    head = [
-        "method",
-        "walks, points",
-        "mean",
-        "median",
-        "75 %",
-        "90 %",
-        "95 %",
-        "right floor",
-        "IPIN",
-        "mean by seed",
-    ]
-    return table(head, rows)
 
 
 def _comparisons(found: Sequence[Section]) -> str:

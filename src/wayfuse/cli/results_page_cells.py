@@ -5,7 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-__all__ = ["metres", "millimetres", "percent", "signed", "span", "table", "whole", "with_unit"]
+__all__ = ["error_table", "metres", "millimetres", "percent", "signed", "span", "table", "whole", "with_unit"]
+
+
+_ERRORS = {"mean": "mean", "p50": "median", "p75": "75 %", "p90": "90 %", "p95": "95 %"}
 
 
 def table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
@@ -54,3 +57,23 @@ def span(interval: Mapping[str, Any], show: Any = metres) -> str:
         return str(show(interval["value"]))
     ends = [str(show(interval[k])).removesuffix(" %") for k in ("low", "high")]
     return f"{show(interval['value'])} [{', '.join(ends)}]"
+
+
+def error_table(methods: Mapping[str, Any], *, up_to: str) -> str:
+    """Errors of each method, the figures up to one of them, floors and IPIN score; the mean of each seed."""
+    names = list(_ERRORS)[: list(_ERRORS).index(up_to) + 1]
+    rows = []
+    for method, of in methods.items():
+        f, means = of["figures"], of["mean_by_seed"]
+        row = [method, f"{of['n_walks']}, {of['n']}", *(span(f[name]) for name in names)]
+        row += [span(f["floor_accuracy"], percent), span(f["ipin"])]
+        rows.append([*row, " ".join(map(metres, means)) if len(means) > 1 else ""])
+    head = [
+        "method",
+        "walks, points",
+        *(_ERRORS[name] for name in names),
+        "right floor",
+        "IPIN",
+        "mean by seed",
+    ]
+    return table(head, rows)

@@ -5,13 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from wayfuse.cli.results_page_cells import metres, percent, signed, span, table, whole
+from wayfuse.cli.results_page_cells import error_table, metres, percent, signed, span, table, whole
 
 __all__ = ["behaviours", "hcu", "ipin2023"]
 
 Section = Mapping[str, Any]
 
-_FIGURES = ("mean", "p50", "p75", "p90")
 _AT = {"waypoints": "At the points", "1hz": "Once a second"}
 
 
@@ -39,10 +38,14 @@ def ipin2023(section: Section) -> list[str]:
         _surveys(section["surveys"]),
     ]
     for group, tables in section["figures"].items():
-        parts += [f"### Errors, {group}", f"{_AT['waypoints']}:", _errors(tables["waypoints"])]
+        parts += [
+            f"### Errors, {group}",
+            f"{_AT['waypoints']}:",
+            error_table(tables["waypoints"], up_to="p90"),
+        ]
         parts += [
             f"{_AT['1hz']}, less the moments between points on different floors:",
-            _errors(tables["1hz"]),
+            error_table(tables["1hz"], up_to="p90"),
         ]
     parts += [
         "### Errors, off route",
@@ -50,7 +53,11 @@ def ipin2023(section: Section) -> list[str]:
             "Trials on one floor; all recordings of the tested trial are left out of the survey as well, so that "
             "most of the way nobody surveyed the line that is walked."
         ),
-        *(f for at, words in _AT.items() for f in (f"{words}:", _errors(section["off_route"][at]))),
+        *(
+            f
+            for at, words in _AT.items()
+            for f in (f"{words}:", error_table(section["off_route"][at], up_to="p90"))
+        ),
         "Mean / median error once a second (points), by distance of the true place to the survey on its floor:",
         _by_distance(section["off_route_by_distance"]),
         "### Paired differences at the points",
@@ -83,27 +90,6 @@ def _surveys(surveys: Sequence[Section]) -> str:
 
 def _decibels(shift: Sequence[float | None]) -> str:
     return " / ".join("-" if value is None else f"{value:+.1f}" for value in shift) + " dB"
-
-
-def _errors(methods: Section) -> str:
-    rows = []
-    for name, of in methods.items():
-        f, means = of["figures"], of["mean_by_seed"]
-        row = [name, f"{of['n_walks']}, {of['n']}", *(span(f[k]) for k in _FIGURES)]
-        row += [span(f["floor_accuracy"], percent), span(f["ipin"])]
-        rows.append([*row, " ".join(map(metres, means)) if len(means) > 1 else ""])
-    head = [
-        "method",
-        "walks, points",
-        "mean",
-        "median",
-        "75 %",
-        "90 %",
-        "right floor",
-        "IPIN",
-        "mean by seed",
-    ]
-    return table(head, rows)
 
 
 def _by_distance(methods: Section) -> str:
