@@ -118,6 +118,13 @@ def _properties(feature: Any) -> dict[str, Any]:
     return held if isinstance(held, dict) else {}
 
 
+def _placed(feature: Any, ordinals: Mapping[str, int]) -> tuple[str, dict[str, Any], int | None]:
+    """Id, properties and the ordinal of the level of a feature, None where it names no known level."""
+    properties = _properties(feature)
+    ident = str(feature.get("id", "")) if isinstance(feature, dict) else ""
+    return ident, properties, ordinals.get(str(properties.get("level_id")))
+
+
 def _label(labels: Any, language: str) -> str:
     """Text of a label in the language of the archive, else in any."""
     if not isinstance(labels, dict) or not labels:
@@ -161,9 +168,8 @@ def _add_units(
     notes: Notes,
 ) -> None:
     for feature in _features(path, files, "unit"):
-        properties, parts = _properties(feature), geojson.polygons(feature)
-        ident = str(feature.get("id", "")) if isinstance(feature, dict) else ""
-        ordinal = ordinals.get(str(properties.get("level_id")))
+        ident, properties, ordinal = _placed(feature, ordinals)
+        parts = geojson.polygons(feature)
         if ordinal is None or not parts:
             notes.append(f"unit {ident}: no polygon on the earth, or no known level: left out")
         else:
@@ -178,14 +184,12 @@ def _add_openings(
     notes: Notes,
 ) -> None:
     for feature in _features(path, files, "opening"):
+        ident, properties, ordinal = _placed(feature, ordinals)
         points = geojson.line(feature)
-        ordinal = ordinals.get(str(_properties(feature).get("level_id")))
         if ordinal is None or points is None:
-            ident = feature.get("id", "") if isinstance(feature, dict) else ""
             notes.append(f"opening {ident}: no line on the earth, or no known level: left out")
         else:
-            ident, held = str(feature.get("id", "")), _properties(feature)
-            levels[ordinal].openings.append((ident, points, held.get("wayfuse:door")))
+            levels[ordinal].openings.append((ident, points, properties.get("wayfuse:door")))
 
 
 def _sources(
@@ -194,10 +198,8 @@ def _sources(
     """Ordinal, id as imported, and category of each unit of a level, by its id in the archive."""
     found = {}
     for feature in _features(path, files, "unit"):
-        properties = _properties(feature)
-        ordinal = ordinals.get(str(properties.get("level_id")))
+        ident, properties, ordinal = _placed(feature, ordinals)
         if ordinal is not None:
-            ident = str(feature.get("id", ""))
             category = str(properties.get("wayfuse:category") or properties.get("category"))
             found[ident] = (ordinal, str(properties.get("wayfuse:id") or ident), category)
     return found
