@@ -3,7 +3,7 @@
 The net has a node about every 4 m of walkable space that keeps off the edges, and an edge between neighbours where
 nothing is in the way; what the net does not join to its largest part is left out. All floors are brought into the
 frame of the site's reference floor. A plan rarely says how stairs run: they go straight from landing to landing, or
-out and back where the landings lie above each other.
+out and back where the landings lie above each other. Escalators that go down are left out.
 """
 
 from __future__ import annotations
@@ -32,6 +32,7 @@ _TRIED, _CLOSED = (
     12,
     0.3,
 )  # places tried per axis of a unit, and the share that may be walkable in a closed one
+_COMBS = 0.05, 0.95  # of an escalator's way: where one steps on and off
 _ALIKE = 0.5  # landings nearer than this share of a flight lie above each other
 
 
@@ -148,7 +149,9 @@ def _largest(nodes: Array, edges: IntArray) -> tuple[Array, IntArray]:
 
 def _passage(connector: Connector, storeys: tuple[Storey, ...], shift: Array) -> Iterator[Passage]:
     """A connector's ways, nothing where a landing is on no way of its floor."""
-    landings = tuple(Landing(p.floor, *(np.array([p.x, p.y]) - shift[p.floor])) for p in connector.landings)
+    landings = tuple(
+        Landing(p.floor, *(np.array([p.x, p.y]) - shift[p.floor]).tolist()) for p in connector.landings
+    )
     if any(np.hypot(*(storeys[p.floor].nodes - (p.x, p.y)).T).min() > 0.01 for p in landings):
         return
     heights = tuple(storeys[p.floor].elevation - storeys[landings[0].floor].elevation for p in landings)
@@ -162,8 +165,14 @@ def _passage(connector: Connector, storeys: tuple[Storey, ...], shift: Array) ->
         return
     rises = np.diff(heights).tolist()
     if connector.kind is ConnectorKind.ESCALATOR and len(landings) == 2 and connector.direction > 0:
-        way = (Stretch(landings[1].x, landings[1].y, Activity.ESCALATOR, rises[0]),)
-        yield escalator(connector.id, (landings[0], landings[1]), way, ring, (0, 0))
+        low, high = landings[0], landings[1]
+        on, off = ((low.x + s * (high.x - low.x), low.y + s * (high.y - low.y)) for s in _COMBS)
+        way = (
+            Stretch(*on, Activity.WALKING),
+            Stretch(*off, Activity.ESCALATOR, rises[0]),
+            Stretch(high.x, high.y, Activity.WALKING),
+        )
+        yield escalator(connector.id, (low, high), way, ring, (0, 0))
     elif connector.kind in {ConnectorKind.STAIRS, ConnectorKind.RAMP}:
         counts = connector.n_steps or tuple(max(1, round(rise / RISER)) for rise in rises)
         ways = tuple(
