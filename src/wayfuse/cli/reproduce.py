@@ -19,7 +19,9 @@ __all__ = ["reproduce"]
     "--seeds", type=click.IntRange(1), help="Number of seeds (default: the paper's own, 20 or more)."
 )
 @click.option(
-    "--out", type=click.Path(path_type=Path), help="Folder to write PRESET.md into, as docs/papers."
+    "--out",
+    type=click.Path(path_type=Path),
+    help="Folder to write PRESET.md and its pictures into, as docs/papers.",
 )
 @click.option("--json", "json_file", type=click.Path(path_type=Path), help="Also write all figures as JSON.")
 @click.option("--jobs", type=click.IntRange(1), help="Processes (default: all cores).")
@@ -34,7 +36,7 @@ def reproduce(
 
     from wayfuse.cli.results import make_mapper
     from wayfuse.core.errors import UsageError
-    from wayfuse.papers.reproduction import PAPERS, page, paper
+    from wayfuse.papers.reproduction import PAPERS, page, paper, write_pictures
 
     done = []
     for name in PAPERS if preset == "all" else (preset,):
@@ -51,7 +53,8 @@ def reproduce(
         if out is not None:
             out.mkdir(parents=True, exist_ok=True)
             (out / f"{name}.md").write_text(page(name).rstrip() + "\n\n" + _page(result), encoding="utf-8")
-            click.echo(f"written to {out / f'{name}.md'}")
+            for file in (out / f"{name}.md", *write_pictures(module, result, out)):
+                click.echo(f"written to {file}")
     if json_file is not None:
         document = json.dumps([r.plain() for r in done], indent=1, allow_nan=False)
         json_file.write_text(document + "\n", encoding="utf-8")

@@ -1,9 +1,10 @@
-"""chu2009, chapter 4: the simulated field, Figures 4.2, 4.3, 4.5 and 4.6."""
+"""chu2009: chapter 4, the simulated field (Figures 4.2, 4.3, 4.5, 4.6), and chapter 5 (`chu2009_building`)."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -12,12 +13,14 @@ from wayfuse.core.types import Array
 from wayfuse.evaluation.results_bars import Bar, at_most, within
 from wayfuse.evaluation.results_folds import Mapper
 from wayfuse.maps.walls import WallIndex
+from wayfuse.papers.chu2009_building import PICTURE, reproduce_building
+from wayfuse.papers.chu2009_building import Experiment as BuildingExperiment
 from wayfuse.papers.reproduction import Interval, Reproduction, Table, mean_interval
 from wayfuse.presets.chu2009 import Config, nnss, pf_mcl, pfmm
 from wayfuse.radio.level_grid import LevelGrid
 from wayfuse.simulator.chu2009_world import FieldModel, draw_field, room_walls, walk
 
-__all__ = ["SEEDS", "Experiment", "reproduce"]
+__all__ = ["SEEDS", "Experiment", "pictures", "reproduce"]
 
 SEEDS = 20
 METHODS = ("NNSS", "PF_MCL", "PFMM")
@@ -95,8 +98,13 @@ def _sensed(moved: Array, condition: Condition, rng: np.random.Generator) -> Arr
     return np.column_stack([c * moved[:, 0] - s * moved[:, 1], s * moved[:, 0] + c * moved[:, 1]])
 
 
-def reproduce(seeds: Sequence[int], mapper: Mapper, experiment: Experiment | None = None) -> Reproduction:
-    """Run every condition with every seed."""
+def reproduce(
+    seeds: Sequence[int],
+    mapper: Mapper,
+    experiment: Experiment | None = None,
+    building: BuildingExperiment | None = None,
+) -> Reproduction:
+    """Run every condition of chapter 4, the building and the lost tracks with every seed."""
     conditions = _conditions()
     items = [(condition, seed) for condition in conditions for seed in seeds]
     found = list(mapper(experiment or Experiment(), items, "chu2009"))
@@ -111,7 +119,24 @@ def reproduce(seeds: Sequence[int], mapper: Mapper, experiment: Experiment | Non
                 lost[method] += is_lost
     total = len(found)
     said = tuple(f"{method}: {n} of {total} runs ended lost" for method, n in lost.items() if n)
-    return Reproduction("chu2009", tuple(seeds), _tables(errors), _bars(errors, lost["PFMM"]), said)
+    storeys = reproduce_building(seeds, mapper, building)
+    return Reproduction(
+        "chu2009",
+        tuple(seeds),
+        (*_tables(errors), *storeys.tables),
+        (*_bars(errors, lost["PFMM"]), *storeys.bars),
+        (*said, *storeys.lost),
+        storeys.curves,
+    )
+
+
+def pictures(result: Reproduction, folder: Path) -> list[Path]:
+    """Draw how soon a lost track is found again; the files written."""
+    from wayfuse.evaluation.plot_recovery import Returns, draw_returns
+
+    curves = [c for c in result.curves if c.picture == PICTURE]
+    panels = {c.panel: [Returns(d.label, d.x, d.y) for d in curves if d.panel == c.panel] for c in curves}
+    return [draw_returns(panels, folder / PICTURE)]
 
 
 _FIGURES = {

@@ -1,15 +1,16 @@
 """What the reproduction of a paper is made of: tables of paper against ours, bars, and words.
 
-A file of this room named as its preset has ``SEEDS``, how many seeds its figures take, and ``reproduce(seeds,
-mapper)``; pages/<preset>.md has the words of docs/papers/<preset>.md (equation, function, test; departures and
-misprints; why figures differ).
+A file of this room named as its preset has ``SEEDS``, how many seeds its figures take, ``reproduce(seeds, mapper)``
+and, where it draws, ``pictures(result, folder)``; pages/<preset>.md has the words of docs/papers/<preset>.md (equation,
+function, test; departures and misprints; why figures differ).
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, field
 from importlib import import_module, resources
+from pathlib import Path
 from typing import Any, Protocol, cast
 
 import numpy as np
@@ -19,7 +20,18 @@ from wayfuse.core.errors import UsageError
 from wayfuse.evaluation.results_bars import Bar
 from wayfuse.evaluation.results_folds import Mapper
 
-__all__ = ["PAPERS", "Curve", "Interval", "Paper", "Reproduction", "Table", "mean_interval", "page", "paper"]
+__all__ = [
+    "PAPERS",
+    "Curve",
+    "Interval",
+    "Paper",
+    "Reproduction",
+    "Table",
+    "mean_interval",
+    "page",
+    "paper",
+    "write_pictures",
+]
 
 PAPERS = ("chu2009", "he2014", "karlsson2015", "li2015", "liu2017")
 _STUDENT = 1.645  # of a normal: two sides, 90 %; with 20 seeds and more Student's differs by less than 5 %
@@ -107,6 +119,12 @@ def paper(name: str) -> Paper:
         if error.name != f"wayfuse.papers.{name}":
             raise
         raise UsageError(f"{name} is not reproduced yet", where="PRESET", remedy="choose another") from error
+
+
+def write_pictures(module: Paper, result: Reproduction, folder: Path) -> list[Path]:
+    """Draw the pictures of a paper into a folder; the files written, none where the paper draws none."""
+    draw: Callable[[Reproduction, Path], list[Path]] | None = getattr(module, "pictures", None)
+    return [] if draw is None else draw(result, folder)
 
 
 def page(name: str) -> str:

@@ -1,7 +1,8 @@
 """``chu2009`` in a building: the whole of its chapter 3, second by second, with what it is held against.
 
 SEPF: displacements, stairs and lift rides move the particles (sampling cases 1 to 3), speed and walls filter them,
-interpolated fingerprints weigh them. PF_MCL: the same radio map, no sensors, no walls. Recovery is ours.
+interpolated fingerprints weigh them. PF_MCL: the same radio map, no sensors; of the plan it knows where somebody can
+be. Recovery is ours.
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ from wayfuse.inertial.vertical import VerticalEvent
 from wayfuse.maps.site import Site
 from wayfuse.models.constraint.barriers import Barriers
 from wayfuse.models.constraint.speed_filter import SpeedFilter, SpeedState
+from wayfuse.models.constraint.walkable_mask import WalkableMask
 from wayfuse.models.motion.connectors import ConnectorMotion
 from wayfuse.models.motion.displaced_disc import StepDisc
 from wayfuse.models.motion.pdr import PdrMotion, StepInput
@@ -46,6 +48,7 @@ class Config:
 
     n_particles: int = 500  # Chapter 5
     r_max: float = 3.0  # m, Eq. 3.3; not given: as chapter 4 here
+    r_max_blind: float = 4.0  # m, of PF_MCL, which has to follow 1 m/s without displacements; not given
     wall_penalty: float = 30.0  # nats: filtered (Section 3.3.2)
     rounds: int = 6  # of widening; the thesis widens without end
     speed: SpeedFilter | None = field(default_factory=lambda: SpeedFilter(least=10.0))  # Eq. 3.4
@@ -88,8 +91,8 @@ def pf_mcl(
 ) -> Said:
     """Monte Carlo localisation without any information on the walker; kidnapped as for `sepf`."""
     key, filter_ = track_key(seed, "pf_mcl"), ParticleFilter(ess_ratio=1.0)
-    far = max(floor.width for floor in site.floors), max(floor.height for floor in site.floors)
-    disc, connectors = StepDisc(r_max=c.r_max, bounds=far), RandomConnectors(site=site)
+    plan = WalkableMask(tuple(floor.walkable for floor in site.floors), 0.0)  # nobody is in a closed room
+    disc, connectors = StepDisc(r_max=c.r_max_blind), RandomConnectors(site=site)
     first, observation = _anywhere(site), MapLikelihood(radio_map=radio_map)
     state, said = None, []
     for t, second in enumerate(seconds):
@@ -97,7 +100,7 @@ def pf_mcl(
         if state is not None:
             if kidnapped and t in kidnapped:
                 state = _put(state, kidnapped[t])
-            state, _ = filter_.predict(key, state, disc, _STILL, None)
+            state, _ = filter_.predict(key, state, disc, _STILL, plan)
             state, _ = filter_.predict(key, state, connectors, 1.0, None)
             if second.scan is not None:
                 weights = np.zeros(c.n_particles)

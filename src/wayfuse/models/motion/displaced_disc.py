@@ -48,26 +48,15 @@ class DisplacedDisc:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StepDisc:
-    """The same for steps, each a displacement of its own. r_max : m. bounds : m, far corner (x, y) of the floors, from
-    (0, 0), that nobody leaves; infinite = no bounds."""
+    """The same for steps, each a displacement of its own. r_max : m."""
 
     r_max: float = 3.0
-    bounds: tuple[float, float] = (math.inf, math.inf)
 
     def __post_init__(self) -> None:
-        if not (self.r_max > 0.0 and min(self.bounds) > 0.0):
-            raise ConfigError(
-                f"r_max and bounds must be positive, got {self.r_max}, {self.bounds}", where="StepDisc"
-            )
+        if not self.r_max > 0.0:
+            raise ConfigError(f"r_max must be positive, got {self.r_max}", where="StepDisc")
 
     def propagate(self, noise: Noise, cloud: Cloud, event: StepInput) -> Cloud:
         """Every particle moved by the step and its own disturbance."""
         moved = (event.length * math.cos(event.heading), event.length * math.sin(event.heading))
-        after = DisplacedDisc(r_max=self.r_max).propagate(noise, cloud, moved)
-        if math.isinf(min(self.bounds)):
-            return after
-        x, y = (
-            np.clip(c, np.float32(0.0), np.float32(top))
-            for c, top in zip((after.x, after.y), self.bounds, strict=True)
-        )
-        return after._replace(x=x, y=y)
+        return DisplacedDisc(r_max=self.r_max).propagate(noise, cloud, moved)
