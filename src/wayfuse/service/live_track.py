@@ -150,6 +150,11 @@ class LiveTrack:
         return self._clock.ahead
 
     @property
+    def state(self) -> TrackState[Any]:
+        """The tracker's state after the last record."""
+        return self._state
+
+    @property
     def verdicts(self) -> dict[str, int]:
         """What became of the records, by `sensors.quality.Verdict`."""
         return dict(self._verdicts)
