@@ -8,7 +8,7 @@ import threading
 from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from wayfuse.core.errors import FormatError
 from wayfuse.service.adapters import ADAPTERS
@@ -19,6 +19,7 @@ from wayfuse.service.world import World
 from wayfuse.storage.log import Entry
 from wayfuse.storage.tracks import Checkpoint, TrackRow
 from wayfuse.tracking.estimate import Estimate
+from wayfuse.tracking.tracker import TrackState
 
 __all__ = ["Applied", "Live", "View", "profile_json", "read_entry"]
 
@@ -191,6 +192,12 @@ class Live:
 
     def recent(self, track: str) -> tuple[int, list[Estimate]]:
         """The estimates of a track that are not written yet, and the number of the first."""
+    def state(self, track: str) -> TrackState[Any] | None:
+        """The tracker's state of a track in memory."""
+        with self._lock:
+            held = self._held.get(track)
+            return None if held is None else held.track.state
+
         with self._lock:
             held = self._held.get(track)
             return (0, []) if held is None else (held.track.first, held.track.undrained())
