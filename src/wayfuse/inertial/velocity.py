@@ -71,7 +71,7 @@ class VelocityConfig:
     """
 
     beta: float = 0.9  # Section 5.2.1
-    k: float = DEFAULTS["kakiuchi"].coefficients[0]  # of the front end, whose low pass differs: see `calibrate`
+    k: float = DEFAULTS["kakiuchi"].coefficients[0]  # for another low pass: see `calibrate`
     swing: float = 0.8  # not printed; sway of a standing hand stays below it
     shortest: float = 0.3  # not printed; running
     longest: float = 1.2  # not printed; strolling
