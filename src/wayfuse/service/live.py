@@ -190,14 +190,14 @@ class Live:
             all_of = [self._view(h) for h in self._held.values() if site in {"", h.row.site}]
         return sorted(all_of, key=lambda v: (-v.row.heard, v.row.track))
 
-    def recent(self, track: str) -> tuple[int, list[Estimate]]:
-        """The estimates of a track that are not written yet, and the number of the first."""
     def state(self, track: str) -> TrackState[Any] | None:
         """The tracker's state of a track in memory."""
         with self._lock:
             held = self._held.get(track)
             return None if held is None else held.track.state
 
+    def recent(self, track: str) -> tuple[int, list[Estimate]]:
+        """The estimates of a track that are not written yet, and the number of the first."""
         with self._lock:
             held = self._held.get(track)
             return (0, []) if held is None else (held.track.first, held.track.undrained())
