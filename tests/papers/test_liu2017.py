@@ -76,7 +76,7 @@ def test_the_whole_reproduction_in_small(tmp_path: Path, monkeypatch: pytest.Mon
     monkeypatch.setenv("WAYFUSE_DATA", str(tmp_path))
     result = reproduce((0, 1), in_turn)
     assert {bar.what for bar in result.bars if not bar.met} <= {"fingerprints - fused", "fused, mean error"}
-    assert len(result.tables) == 8
+    assert len(result.tables) == 9
     assert {line.split(":")[0] for line in result.lost} >= {"imu", "sigma_d 0.1"}
 
 

@@ -12,10 +12,12 @@ import pytest
 from wayfuse.evaluation.results_folds import in_turn
 from wayfuse.evaluation.results_repetitions import Repetitions, key_of
 from wayfuse.formats.reading import read
+from wayfuse.inertial.derivative_steps import count_steps
 from wayfuse.maps.importers.ipin2023 import import_site
 from wayfuse.models.survey_walk import place_of, survey_walk
 from wayfuse.papers import karlsson2015_real, liu2017_real
 from wayfuse.papers.ipin2023_walks import first_waypoint, fused_beside, measure, steps_alone
+from wayfuse.papers.oxford_counts import step_count_table
 from wayfuse.papers.sodindoorloc_buildings import read_buildings
 from wayfuse.presets import karlsson2015_tracker, liu2017_tracker
 
@@ -23,7 +25,7 @@ from wayfuse.presets import karlsson2015_tracker, liu2017_tracker
 def test_absent_data_are_said_to_be_absent(tmp_path: Path) -> None:
     for paper in (liu2017_real, karlsson2015_real):
         tables = paper.real_tables(tmp_path, in_turn)
-        assert len(tables) == 2
+        assert len(tables) == 3
         for table in tables:
             assert table.columns == ("not measured",)
             assert "wayfuse datasets fetch" in str(table.rows[0][0])
@@ -85,3 +87,15 @@ def test_one_real_walk_from_its_start(museum: Repetitions, build: Any) -> None:
         off.append(float(np.hypot(last.x - x, last.y - y)))
     assert len(off) > 5
     assert np.mean(off) < 16.0  # of 124 m x 72 m; guessing is 40 m
+
+
+@pytest.mark.real_data
+def test_steps_of_every_way_to_carry_are_counted(data_root: Path) -> None:
+    if not (data_root / "oxford-steps").is_dir():
+        pytest.skip("REAL DATA ABSENT: `wayfuse datasets fetch oxford-steps`")
+    table = step_count_table(data_root, lambda acceleration: len(count_steps(acceleration)), "")
+    rows = {str(row[0]): row for row in table.rows}
+    assert int(str(rows["all"][1])) == sum(int(str(row[1])) for row in table.rows) / 2 > 10
+    assert float(str(rows["hand"][2]).removesuffix(" %")) < 2.0
+    none = step_count_table(data_root, lambda _: 0, "")
+    assert all(row[2] == "100.0 %" and row[3] == "-100.0 %" for row in none.rows)

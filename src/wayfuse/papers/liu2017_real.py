@@ -16,8 +16,10 @@ import numpy as np
 
 from wayfuse.core.types import Array
 from wayfuse.evaluation.results_folds import Mapper
+from wayfuse.inertial.autocorrelation_steps import count_steps
 from wayfuse.maps.site import Site
 from wayfuse.papers.ipin2023_walks import Build, first_waypoint, fused_beside, steps_alone, walk_table
+from wayfuse.papers.oxford_counts import step_count_table
 from wayfuse.papers.reproduction import Interval, Table, mean_interval
 from wayfuse.papers.sodindoorloc_buildings import Building, Samples, absent, read_buildings
 from wayfuse.presets import liu2017_tracker
@@ -26,7 +28,7 @@ from wayfuse.radio.ap_estimation import estimate_places
 from wayfuse.radio.ap_places import ApPlaces
 from wayfuse.radio.ap_sequence import Neighbours, from_positions
 from wayfuse.radio.survey import Survey
-from wayfuse.sensors.recording import Recording
+from wayfuse.sensors.recording import Recording, Series
 from wayfuse.tracking.tracker import Tracker
 
 __all__ = ["estimated_places_errors", "fix_errors", "real_tables", "walks_table"]
@@ -41,9 +43,14 @@ def real_tables(root: Path, mapper: Mapper) -> tuple[Table, ...]:
     """The tables on real data, or those that say that they were not measured where a data set is not there."""
     buildings = read_buildings(root / "sodindoorloc")
     walks = walks_table(root / "ipin2023-track3" / "logs", mapper)
+    counts = step_count_table(root, _counted, "The counter of Section III-C.")
     if not buildings:
-        return Table("Real data: sodindoorloc", ("not measured",), ((absent(),),)), walks
-    return _fixes(buildings), _estimates(buildings), walks
+        return Table("Real data: sodindoorloc", ("not measured",), ((absent(),),)), walks, counts
+    return _fixes(buildings), _estimates(buildings), walks, counts
+
+
+def _counted(acceleration: Series) -> int:
+    return int(count_steps(acceleration).steps[-1])
 
 
 # --- points -------------------------------------------------------------------------------------------------
