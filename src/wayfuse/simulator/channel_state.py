@@ -38,12 +38,12 @@ class ChannelModel:
     """Packets and card."""
 
     period_s: float = 0.0  # s between packets of each access point; 0: no channel state
-    n_antennas: int = 3
+    n_antennas: int = 3  # that receive
     band: int = 1  # 0: 2.4 GHz, 1: 5 GHz
-    noise_dbm: float = -92.0
+    noise_dbm: float = -92.0  # at each of them
     weakest_dbm: float = -85.0  # packets below are lost
     timing_ns: float = 50.0  # largest error of the start of sampling
-    coherence_m: float = 0.5
+    coherence_m: float = 0.5  # m of way after which the channel is drawn anew
     multipath: MultipathModel = field(default_factory=MultipathModel)
 
     def __post_init__(self) -> None:

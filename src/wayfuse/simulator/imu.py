@@ -32,7 +32,7 @@ _DRIFT_KNOT_S = 1.0  # s between the values of slow drifts
 class ImuModel:
     """Sensor and hand. "measured" marks figures of the public ms-indoor recordings (BMI160, AK09911)."""
 
-    rate_hz: float = 50.0
+    rate_hz: float = 50.0  # samples a second
     rate_sigma: float = 0.005  # relative, between phones; measured 49.5 to 50.8 Hz
     jitter_s: float = 3e-4  # of a sample's time
     harmonics: tuple[float, ...] = (1.0, 0.37, 0.13)  # vertical, at 1, 2, 3 x the step rate; measured ratios

@@ -55,7 +55,7 @@ class RadioModel:
 
     model: str = field(default="log-distance", metadata={"one_of": ("log-distance", "rim", "images")})
     access_points: tuple[AccessPoint, ...] = field(default=(), metadata={"of": AccessPoint})  # else random
-    aps_per_floor: int = 24
+    aps_per_floor: int = 24  # where they are not given
     ap_height: float = 3.0  # m above the floor
     house_share: float = 0.45  # of them the house's, over the corridors; the others stand in shops
     single_band_share: float = 0.2  # of the shops' access points: 2.4 GHz only
@@ -69,7 +69,7 @@ class RadioModel:
     wall_sigma: float = 1.2  # dB, between walls
     wall_cap_db: float = 26.0  # many walls: the wave goes around
     slab_db: tuple[float, float] = (18.3, 23.0)  # a slab (COST 231: 18.3 dB at 1.8 GHz)
-    shadow_sigma: float = 4.0  # dB
+    shadow_sigma: float = 4.0  # dB, of the shadowing
     shadow_m: float = 5.0  # m, decorrelation distance indoors
     shadow_shared: float = 0.6  # share of the variance common to both bands
     rim: RimModel = field(default_factory=RimModel)

@@ -33,11 +33,11 @@ class RimModel:
 
     power_dbm: tuple[float, float] = (15.0, 9.0)  # P_t
     vsp: float = 0.02  # of P_t, between transmitters
-    doi: float = 0.004
+    doi: float = 0.004  # change of the path loss per degree, relative
     waf: float = 3.0  # dB, each wall
     max_walls: int = 4  # maxW
     reference_db: float = 37.3  # path loss at 1 m
-    exponent: float = 3.3
+    exponent: float = 3.3  # of the path loss
 
     def __post_init__(self) -> None:
         no_negative(self, but=("power_dbm",))

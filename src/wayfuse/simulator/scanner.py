@@ -28,7 +28,7 @@ class ScannerModel:
     period_s: float = (
         2.1  # s between lists; measured 1.9 to 3.7. Throttled Android: 30 (4 scans in 2 minutes)
     )
-    period_jitter_s: float = 0.1
+    period_jitter_s: float = 0.1  # of it, standard deviation
     sweep_s: float = 1.4  # s from the first channel to the last
     latency_s: float = 0.6  # s from the last channel to the list; measured age of the freshest tenth 0.73 s
     memory_s: float = 30.0  # s a network stays listed; measured 99 % younger than 29 s
@@ -45,7 +45,7 @@ class ScannerModel:
     body_db: float = 7.0  # behind the walker's back
     device_offset_db: tuple[float, float] = (0.0, 0.0)  # of this phone's receiver, at 2.4 and 5 GHz
     throttle_scans: int = 0  # most scans in throttle_s; Android grants an app in front 4; 0: no limit
-    throttle_s: float = 120.0
+    throttle_s: float = 120.0  # s
     missed_share: float = 0.0  # of the scans asked for: nothing is heard, nothing is delivered
     stale_repeats: bool = False  # a scan refused or missed delivers the last list again
 

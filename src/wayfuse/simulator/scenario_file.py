@@ -64,7 +64,7 @@ class Place(NamedTuple):
 class SitePart:
     """Where: a site folder, or one of the buildings built in."""
 
-    building: str = field(default="house", metadata={"one_of": ("house", "mall", "hall")})
+    building: str = field(default="house", metadata={"one_of": ("house", "mall", "hall")})  # built in
     folder: str = ""  # of a site, relative to the scenario's file; then ``building`` does not count
     escalator: bool = False  # in the house
     size: tuple[float, float] = (40.0, 25.0)  # m, of the hall
@@ -78,17 +78,17 @@ class SitePart:
 class WalkersPart:
     """The walks to track."""
 
-    number: int = 6
+    number: int = 6  # of walks
     waypoints: tuple[Place, ...] = field(
         default=(), metadata={"of": Place}
     )  # one way for all; else at random
     changes: int = 2  # of floors, on a way at random, where the building has ways between them
-    connectors: str = field(default="both", metadata={"one_of": ("both", "stairs", "lift")})
+    connectors: str = field(default="both", metadata={"one_of": ("both", "stairs", "lift")})  # to take
     visit_m: tuple[float, float] = (14.0, 34.0)  # shortest and longest way on each floor of such a walk
     duration_s: tuple[float, float] = (60.0, 90.0)  # of a walk on one floor
     wander_m: float = 0.6  # how far beside a way's nodes people pass
     pause_share: float = 0.12  # of inner way points at which they stand
-    pause_s: tuple[float, float] = (2.0, 5.0)
+    pause_s: tuple[float, float] = (2.0, 5.0)  # how long
     phones: tuple[str, ...] = field(default=(), metadata={"of": str})  # carried in turn; none: all models
     gait: WalkerModel = field(default_factory=WalkerModel)
     lift: LiftModel = field(default_factory=LiftModel)
@@ -117,7 +117,7 @@ class PhoneModel:
 class PhonePart:
     """The phones and their sensors."""
 
-    models: tuple[PhoneModel, ...] = field(default=(PhoneModel(),), metadata={"of": PhoneModel})
+    models: tuple[PhoneModel, ...] = field(default=(PhoneModel(),), metadata={"of": PhoneModel})  # see above
     imu: ImuModel = field(default_factory=ImuModel)
     barometer: BarometerModel = field(default_factory=BarometerModel)
 
@@ -130,8 +130,8 @@ class PhonePart:
 class ChangesPart:
     """What happens to the access points between survey and walks."""
 
-    moved: int = 0
-    removed: int = 0
+    moved: int = 0  # access points that hang elsewhere on their floor
+    removed: int = 0  # and that are gone
 
     def __post_init__(self) -> None:
         no_negative(self)
@@ -143,7 +143,7 @@ class SurveyPart:
 
     walks: int = 24  # on the floors in turn, the least walked corridors first
     connectors: bool = True  # and one walk through each stairway and lift
-    duration_s: tuple[float, float] = (40.0, 60.0)
+    duration_s: tuple[float, float] = (40.0, 60.0)  # of a walk on a floor
     stated_sigma: float = 0.1  # m, how well a surveyor states where he is
     phone: str = ""  # name of a model; empty: the first
 
@@ -169,11 +169,11 @@ class OutputPart:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ScenarioFile:
-    """A scenario. version : of wayfuse, in the copies that `wayfuse simulate` writes; without influence."""
+    """A scenario: all of a file."""
 
-    title: str = ""
-    seed: int = 0
-    version: str = ""
+    title: str = ""  # for readers
+    seed: int = 0  # of all random numbers; --seed goes before it
+    version: str = ""  # of wayfuse, in the copy it writes; without influence
     site: SitePart = field(default_factory=SitePart)
     walkers: WalkersPart = field(default_factory=WalkersPart)
     phone: PhonePart = field(default_factory=PhonePart)
