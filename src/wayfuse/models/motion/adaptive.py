@@ -16,22 +16,18 @@ References
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import TypeAlias
 
 import numpy as np
 
 from wayfuse.core.errors import ConfigError
 from wayfuse.core.philox import Noise
 from wayfuse.filters.cloud import Cloud
+from wayfuse.models.motion.pdr import StepInput
 
-__all__ = ["AdaptiveMotion", "Walked"]
+__all__ = ["AdaptiveMotion", "StandingDisc", "Walked"]
 
-
-class Walked(NamedTuple):
-    """A move of one epoch: length m, heading rad, building frame."""
-
-    length: float
-    heading: float
+Walked: TypeAlias = StepInput  # a move of one epoch: length m, heading rad, building frame
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -60,3 +56,14 @@ class AdaptiveMotion:
             heading = event.heading + self.heading_sigma * z[1]  # Eq. 5
         x, y = cloud.x + length * np.cos(heading), cloud.y + length * np.sin(heading)
         return cloud._replace(x=x.astype(np.float32), y=y.astype(np.float32))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StandingDisc:
+    """The disc alone, for the time in which no step was made. radius : m, however long the time is."""
+
+    radius: float = 1.0
+
+    def propagate(self, noise: Noise, cloud: Cloud, event: float) -> Cloud:  # noqa: ARG002
+        """Every particle to a place of its disc; ``event`` is seconds."""
+        return AdaptiveMotion(radius=self.radius).propagate(noise, cloud, None)
