@@ -13,7 +13,16 @@ from sqlalchemy.exc import SQLAlchemyError
 
 from wayfuse import __version__
 from wayfuse.service.problems import handle_problems
-from wayfuse.service.routes import admin, inputs, outputs, pages, stream
+from wayfuse.service.routes import (
+    admin,
+    inputs,
+    outputs,
+    pages,
+    stream,
+    web_assets,
+    web_particles,
+    web_plan,
+)
 from wayfuse.service.security import SecurityHeaders
 from wayfuse.service.server import Server
 
@@ -48,7 +57,7 @@ def create_app(server: Server) -> FastAPI:
         redoc_url=None,
     )
     app.state.server = server
-    for part in (inputs, outputs, stream, admin, pages):
+    for part in (inputs, outputs, stream, web_plan, web_particles, admin, pages, web_assets):
         app.include_router(part.router)
     handle_problems(app)
     app.add_middleware(SecurityHeaders)
