@@ -23,6 +23,20 @@ def offspring(scheme: str, weights: np.ndarray, n: int, repeats: int) -> np.ndar
     return np.array([np.bincount(draw(noise, weights, n), minlength=len(weights)) for _ in range(repeats)])
 
 
+@given(
+    weights=hnp.arrays(np.float64, st.integers(1, 40), elements=st.floats(0.01, 1.0)), seed=st.integers(0, 99)
+)
+def test_ancestors_are_those_of_the_running_sum(weights: np.ndarray, seed: int) -> None:
+    n, total = 25, np.cumsum(weights)
+    for scheme, positions in {
+        "systematic": (np.arange(n) + Noise.of(seed, "x").uniforms(1)[0, 0]) / n,
+        "stratified": (np.arange(n) + Noise.of(seed, "x").uniforms(n)[0]) / n,
+        "multinomial": np.sort(Noise.of(seed, "x").uniforms(n)[0]),
+    }.items():
+        got = RESAMPLERS[scheme](Noise.of(seed, "x"), weights, n)
+        np.testing.assert_array_equal(got, np.searchsorted(total, positions * total[-1]))
+
+
 @SCHEMES
 @pytest.mark.parametrize("n", [10, 37])
 def test_mean_offspring_is_n_w(scheme: str, n: int) -> None:
