@@ -138,3 +138,21 @@ def test_weighting_beats_the_linearised_fix_under_noise() -> None:
         plain.append(math.dist(first, truth))
         weighted.append(math.dist(gauss_newton_fix(where, r, r_sigma, first), truth))
     assert np.mean(weighted) < 0.8 * np.mean(plain)
+
+
+def test_an_offset_shared_by_a_scan_is_integrated_out() -> None:
+    rng = np.random.default_rng(4)
+    ap_xy, xy = rng.uniform(0.0, 20.0, (3, 2)), rng.uniform(0.0, 20.0, (6, 2))
+    bands = (PathLoss(-35.0, 0.15, 3.0), PathLoss(-40.0, 0.25, 5.0))
+    rssi = np.array([[-60.0, np.nan, -70.0], [-66.0, -72.0, np.nan]])
+    heard = np.isfinite(rssi)
+    sigma = np.concatenate([np.full(h.sum(), band.sigma) for h, band in zip(heard, bands, strict=True)])
+    covariance = np.diag(sigma**2) + 6.0**2
+    expected = []
+    for place in xy:
+        away = np.hypot(*(ap_xy - place).T)
+        residual = np.concatenate([r[h] - b.at(away[h]) for r, h, b in zip(rssi, heard, bands, strict=True)])
+        expected.append(-0.5 * residual @ np.linalg.solve(covariance, residual))
+    np.testing.assert_allclose(log_likelihood(bands, ap_xy, rssi, xy, offset_sigma=6.0), expected)
+    louder = log_likelihood(bands, ap_xy, rssi + 8.0, xy, offset_sigma=1e4)
+    np.testing.assert_allclose(louder, log_likelihood(bands, ap_xy, rssi, xy, offset_sigma=1e4), atol=1e-3)
