@@ -14,6 +14,7 @@ from wayfuse.evaluation.results_bars import Bar, at_least, at_most, within
 from wayfuse.evaluation.results_folds import Mapper
 from wayfuse.formats.datasets import data_root
 from wayfuse.models.observation.ranges import Exponents
+from wayfuse.papers.li2015_channel import channel_table
 from wayfuse.papers.li2015_real import captures, range_tables
 from wayfuse.papers.reproduction import Interval, Reproduction, Table, mean_interval
 from wayfuse.presets.li2015 import R_PF, Config, dead_reckon, track
@@ -146,7 +147,7 @@ def reproduce(seeds: Sequence[int], mapper: Mapper) -> Reproduction:
     tables = [_table_1(figures), _exponents(figures), _further(figures)]
     bars = _bars(figures)
     table, met = captures(data_root() / "csi" / "intel5300-distance")
-    tables += [table, *range_tables(data_root() / "wifi-rtt", mapper)]
+    tables += [channel_table(mapper), table, *range_tables(data_root() / "wifi-rtt", mapper)]
     bars += met
     return Reproduction("li2015", tuple(seeds), tuple(tables), tuple(bars), figures.lost())
 
