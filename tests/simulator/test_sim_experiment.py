@@ -21,6 +21,7 @@ from wayfuse.simulator.imu import ImuModel
 from wayfuse.simulator.passages import Activity
 from wayfuse.simulator.radio_field import RadioModel
 from wayfuse.simulator.round_trip import RangesModel
+from wayfuse.simulator.scanner import ScannerModel
 from wayfuse.simulator.scenario_file import (
     ChangesPart,
     OutputPart,
@@ -299,3 +300,14 @@ def test_a_survey_of_an_open_hall_spreads_over_it():
     nodes = world.building.storeys[0].nodes
     gap = np.hypot(*(nodes[:, None] - places[None]).transpose(2, 0, 1)).min(axis=1)
     assert np.mean(gap < 5.0) > 0.8
+
+
+def test_a_survey_is_throttled_only_where_it_is_said():
+    scan = ScannerModel(period_s=1.0, throttle_scans=2, before_s=0.0, stale_repeats=True, memory_s=60.0)
+    for throttled in (False, True):
+        scenario = replace(SMALL, scan=scan, survey=replace(FEW, throttled=throttled))
+        world, plans = world_of(scenario)
+        for plan in plans:
+            wifi = simulate_plan(world, plan).recording.wifi
+            fresh = {float(s.last_seen.max()) for s in wifi}
+            assert (len(fresh) <= 2) == (throttled or plan.role == "walk")

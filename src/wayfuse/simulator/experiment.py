@@ -160,7 +160,10 @@ def _check_places(scenario: ScenarioFile, building: Building) -> None:
 def _numbers(scenario: ScenarioFile, role: str, phone: int) -> Scenario:
     """The models' numbers of a walk, with its phone's own."""
     walkers, survey = scenario.walkers, scenario.survey
-    low, high = np.add(scenario.scan.device_offset_db, scenario.phone.models[phone].rss_offset_db).tolist()
+    scanner = scenario.scan
+    if role == "survey" and not survey.throttled:
+        scanner = replace(scanner, throttle_scans=0, stale_repeats=False)
+    low, high = np.add(scanner.device_offset_db, scenario.phone.models[phone].rss_offset_db).tolist()
     return Scenario(
         duration_s=survey.duration_s if role == "survey" else walkers.duration_s,
         wander_m=walkers.wander_m,
@@ -172,7 +175,7 @@ def _numbers(scenario: ScenarioFile, role: str, phone: int) -> Scenario:
         walker=walkers.gait,
         imu=scenario.phone.imu,
         radio=scenario.radio,
-        scanner=replace(scenario.scan, device_offset_db=(low, high)),
+        scanner=replace(scanner, device_offset_db=(low, high)),
         barometer=scenario.phone.barometer,
         lift=walkers.lift,
     )

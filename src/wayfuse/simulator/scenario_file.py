@@ -144,6 +144,7 @@ class SurveyPart:
     walks: int = 24  # on the floors in turn, the least walked corridors first
     connectors: bool = True  # and one walk through each stairway and lift
     duration_s: tuple[float, float] = (40.0, 60.0)  # of a walk on a floor
+    throttled: bool = False  # whether scan.throttle_scans holds for surveyors too; they can switch it off
     stated_sigma: float = 0.1  # m, how well a surveyor states where he is
     phone: str = ""  # name of a model; empty: the first
 
