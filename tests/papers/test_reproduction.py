@@ -12,7 +12,15 @@ import pytest
 from wayfuse.core.errors import UsageError
 from wayfuse.evaluation.results_bars import at_most
 from wayfuse.papers import reproduction
-from wayfuse.papers.reproduction import PAPERS, Interval, Reproduction, Table, mean_interval, paper
+from wayfuse.papers.reproduction import (
+    PAPERS,
+    Interval,
+    Reproduction,
+    Table,
+    mean_interval,
+    paper,
+    write_pictures,
+)
 
 
 def made_up(limit: float) -> Any:
@@ -58,3 +66,19 @@ def test_the_command_prints_tables_and_bars(
     assert "| all | 2.00 | 2.00 [1.05, 2.95] |" in page
     (document,) = json.loads((tmp_path / "x.json").read_text(encoding="utf-8"))
     assert document["bars"][0]["met"] is (code == 0)
+
+
+def test_the_command_writes_the_pictures_of_papers_that_draw(
+    run_cli: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def pictures(result: Reproduction, folder: Path) -> list[Path]:
+        (folder / "a.png").write_text(f"{len(result.seeds)} seeds")
+        return [folder / "a.png"]
+
+    module = made_up(2.0)
+    assert write_pictures(module, module.reproduce((0,), lambda f, items, _: map(f, items)), tmp_path) == []
+    module.pictures = pictures
+    monkeypatch.setattr(reproduction, "paper", lambda _: module)
+    said = run_cli("reproduce", "liu2017", "--out", str(tmp_path), "--jobs", "1")
+    assert f"written to {tmp_path / 'a.png'}" in said.out
+    assert (tmp_path / "a.png").read_text() == "3 seeds"
