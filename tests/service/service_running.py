@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import httpx
+import httpx2
 
 __all__ = ["Running", "running", "wait_until"]
 
@@ -28,10 +28,10 @@ class Running:
     address: str
     token: str
 
-    def client(self, **more: Any) -> httpx.Client:
+    def client(self, **more: Any) -> httpx2.Client:
         """A client that sends the token."""
         headers = {"Authorization": f"Bearer {self.token}"}
-        return httpx.Client(base_url=self.address, headers=headers, timeout=30.0, trust_env=False, **more)
+        return httpx2.Client(base_url=self.address, headers=headers, timeout=30.0, trust_env=False, **more)
 
     def kill(self) -> None:
         """As a crash would."""
@@ -105,8 +105,8 @@ def _ready(process: subprocess.Popen[str], token: str) -> Running:
     raise AssertionError(f"the server did not start: {process.communicate()[1]}")
 
 
-def _is_up(client: httpx.Client) -> bool:
+def _is_up(client: httpx2.Client) -> bool:
     try:
         return client.get("/health").status_code == 200
-    except httpx.TransportError:
+    except httpx2.TransportError:
         return False

@@ -195,7 +195,7 @@ def test_a_forgotten_phone_leaves_nothing_but_empty_rows(engine: Engine) -> None
     row = TrackRow("t", "site", "d1", 1, 5.0, 6.0)
     store.save(3, [Checkpoint(row, 0, [_estimate(1.0)], b"one")])
     log.append([_entry(1), _entry(2, device="d2"), _entry(3)])
-    assert store.forget("d1") == 1
+    assert store.forget("d1") == {"t"}
     assert store.state("t") is None
     assert store.estimates("t") == []
     assert [(e.seq, e.device, e.body == b"") for e in log.read()] == [

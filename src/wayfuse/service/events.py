@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import asyncio
 from bisect import bisect_right
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Collection
 from operator import attrgetter
 from typing import NamedTuple
 
@@ -55,6 +55,10 @@ class Hub:
             self._dropped = self._ring[-self._size - 1].id
             del self._ring[: -self._size]
         self._wake()
+
+    def forget(self, tracks: Collection[str]) -> None:
+        """Take the places out of what was said of tracks."""
+        self._ring = [e._replace(data=b"{}", track="") if e.track in tracks else e for e in self._ring]
 
     def close(self) -> None:
         """End all streams."""

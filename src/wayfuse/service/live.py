@@ -170,11 +170,13 @@ class Live:
                 del self._held[track]
             return len(idle)
 
-    def forget(self, device: str) -> None:
-        """Drop the tracks of a device."""
+    def forget(self, device: str) -> set[str]:
+        """Drop the tracks of a device; which."""
         with self._lock:
-            for track in [k for k, h in self._held.items() if h.row.device == device]:
+            gone = {k for k, h in self._held.items() if h.row.device == device}
+            for track in gone:
                 del self._held[track]
+            return gone
 
     # --- what comes out
 

@@ -10,10 +10,10 @@ from __future__ import annotations
 import logging
 import threading
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from concurrent.futures import Future
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 from sqlalchemy.exc import SQLAlchemyError
 
@@ -26,6 +26,9 @@ from wayfuse.storage.tracks import Checkpoint, TrackStore
 __all__ = ["BusyError", "Item", "Pipeline", "PipelineConfig", "recover"]
 
 _log = logging.getLogger(__name__)
+
+
+T = TypeVar("T")
 
 
 class BusyError(WayfuseError):
@@ -87,6 +90,7 @@ class Pipeline:
         self._kept = self.applied  # seq of the last checkpoint
         self._due = clock() + self._config.checkpoint_every
         self._queue: deque[_Waiting] = deque()
+        self._calls: list[Callable[[], None]] = []
         self._bytes = 0
         self._unsaved: list[Checkpoint] = []  # of rounds that could not be written
         self._wake = threading.Condition()
@@ -127,6 +131,28 @@ class Pipeline:
             self._wake.notify()
         return done
 
+    def call(self, do: Callable[[], T]) -> Future[T]:
+        """Do something in the thread, between two groups, when nothing moves.
+
+        Raises
+        ------
+        BusyError : the server is going down.
+        """
+        done: Future[T] = Future()
+
+        def run() -> None:
+            try:
+                done.set_result(do())
+            except Exception as error:  # it is the caller's, who waits for it
+                done.set_exception(error)
+
+        with self._wake:
+            if self._stopping:
+                raise BusyError("the server is going down", remedy="send it again later")
+            self._calls.append(run)
+            self._wake.notify()
+        return done
+
     def _run(self) -> None:
         try:
             self._work()
@@ -140,7 +166,9 @@ class Pipeline:
 
     def _work(self) -> None:
         while True:
-            group = self._take()
+            group, calls = self._take()
+            for call in calls:
+                call()
             if group:
                 self._do(group)
             is_over = self._is_over()
@@ -151,11 +179,11 @@ class Pipeline:
 
     def _is_over(self) -> bool:
         with self._wake:
-            return self._stopping and not self._queue
+            return self._stopping and not self._queue and not self._calls
 
-    def _take(self) -> list[_Waiting]:
+    def _take(self) -> tuple[list[_Waiting], list[Callable[[], None]]]:
         with self._wake:
-            if not self._queue and not self._stopping:
+            if not (self._queue or self._calls or self._stopping):
                 self._wake.wait(min(1.0, self._config.checkpoint_every))
             group: list[_Waiting] = []
             n = 0
@@ -164,7 +192,8 @@ class Pipeline:
                 n += len(group[-1].items)
             self.n_waiting -= n
             self._bytes -= sum(len(i.entry.body) for w in group for i in w.items)
-            return group
+            calls, self._calls = self._calls, []
+            return group, calls
 
     def _do(self, group: list[_Waiting]) -> None:
         seq, numbered = self._next, list[Item]()
@@ -192,6 +221,10 @@ class Pipeline:
                 changes.append(applied)
             self.applied = item.entry.seq
         self._publish(changes, self.applied)
+
+    def drop(self, tracks: Collection[str]) -> None:
+        """Leave tracks out of what is still to be written; to be used in `call` alone."""
+        self._unsaved = [kept for kept in self._unsaved if kept.row.track not in tracks]
 
     def _checkpoint(self) -> None:
         now = self._clock()

@@ -22,7 +22,7 @@ from wayfuse.service.limits import RateLimit
 from wayfuse.service.live import Applied, Live, View
 from wayfuse.service.live_track import LiveConfig
 from wayfuse.service.metrics import Metrics
-from wayfuse.service.pipeline import Pipeline, PipelineConfig, recover
+from wayfuse.service.pipeline import BusyError, Pipeline, PipelineConfig, recover
 from wayfuse.service.positions import Json, feature
 from wayfuse.service.security import Authority
 from wayfuse.service.settings import Settings
@@ -211,11 +211,26 @@ class Server:
         self.tracks.trim(now - 86_400.0 * self.settings.retain_tracks_d)
 
     def forget(self, device: str) -> int:
-        """Delete all that is kept of a device, by its pseudonym; how many tracks it had."""
-        self.live.forget(device)
-        n = self.tracks.forget(device)
+        """Delete all that is kept of a device, by its pseudonym; how many tracks it had.
+
+        Raises
+        ------
+        BusyError : the server is not working.
+        """
+        if self.pipeline is None:
+            raise BusyError("the server is starting", remedy="send it again in a moment")
+        gone: set[str] = self.pipeline.call(lambda: self._forget(device)).result()
+        if self._loop is not None:
+            self._loop.call_soon_threadsafe(self.hub.forget, gone)
+        return len(gone)
+
+    def _forget(self, device: str) -> set[str]:
+        gone = self.live.forget(device)
+        if self.pipeline is not None:
+            self.pipeline.drop(gone)
+        gone |= self.tracks.forget(device)
         self.devices.remove(device)
-        return n
+        return gone
 
     # --- what comes out
 

@@ -116,20 +116,18 @@ class TrackStore:
             connection.execute(delete(estimates).where(estimates.c.track.in_(old)))
             return int(connection.execute(delete(tracks).where(tracks.c.heard < heard_before)).rowcount)
 
-    def forget(self, device: str) -> int:
-        """Delete all of a phone, its part of the log too; how many tracks it had."""
+    def forget(self, device: str) -> set[str]:
+        """Delete all of a phone, its part of the log too; which tracks it had."""
         with self._engine.begin() as connection:
             names = select(tracks.c.track).where(tracks.c.device == device)
-            n = connection.execute(
-                select(func.count()).select_from(tracks).where(tracks.c.device == device)
-            ).scalar_one()
+            gone = set(connection.execute(names).scalars())
             connection.execute(delete(checkpoints).where(checkpoints.c.track.in_(names)))
             connection.execute(delete(estimates).where(estimates.c.track.in_(names)))
             connection.execute(delete(tracks).where(tracks.c.device == device))
             # the rows stay as empty ones: seq has no gaps, and its last value is never lost
-            gone = {"body": b"", "device": "", "track": "", "profile": "", "adapter": "deleted"}
-            connection.execute(update(ingest_log).where(ingest_log.c.device == device).values(**gone))
-            return int(n)
+            empty = {"body": b"", "device": "", "track": "", "profile": "", "adapter": "deleted"}
+            connection.execute(update(ingest_log).where(ingest_log.c.device == device).values(empty))
+            return gone
 
 
 def _save(connection: Connection, seq: int, kept: Checkpoint) -> None:

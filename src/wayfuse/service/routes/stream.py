@@ -127,13 +127,14 @@ async def talk(socket: WebSocket) -> None:
         if hello.listen:
             tasks.append(asyncio.create_task(_tell(socket, server, site, hello)))
         try:
-            done, _ = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
-            for task in done:
-                task.result()
+            await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
         finally:
             for task in tasks:
                 task.cancel()
-            await asyncio.gather(*tasks, return_exceptions=True)
+            await asyncio.wait(tasks)  # not gather: that would put the tasks' cancellation for our own
+        for task in tasks:
+            if not task.cancelled():
+                task.result()
         with suppress(RuntimeError):  # closed by the other side already
             await socket.close(_BUSY)
 

@@ -1,43 +1,92 @@
-// Lists sites and tracks, once a second; the token stays in the memory of the page.
-const said = document.getElementById("said");
-let token = "";
+// The page: token, site, map, and the parts that share them.
 
-async function ask(path) {
-  const answer = await fetch(path, { headers: { Authorization: `Bearer ${token}` } });
-  const body = await answer.json();
-  if (!answer.ok) throw new Error(`${body.error} (${body.remedy})`);
-  return body;
-}
+import { Refused, get, hasToken, keepToken, listen } from "/web/api.js";
+import { byId, el, notice } from "/web/dom.js";
+import { startDrawing } from "/web/draw.js";
+import { startFloors } from "/web/floors.js";
+import { IndoorMap } from "/web/map.js";
+import { startReplay } from "/web/replay.js";
+import { store } from "/web/store.js";
+import { startSurvey } from "/web/survey.js";
+import { startTabs } from "/web/tabs.js";
+import { startTheme } from "/web/theme.js";
+import { startTracks } from "/web/tracks.js";
 
-function fill(id, rows) {
-  const body = document.querySelector(`#${id} tbody`);
-  body.replaceChildren(...rows.map((cells) => {
-    const row = document.createElement("tr");
-    for (const text of cells) row.appendChild(document.createElement("td")).textContent = text;
-    return row;
-  }));
-}
+let listening = new AbortController();
 
-async function show() {
-  const [{ sites }, { features }] = await Promise.all([ask("/api/v1/sites"), ask("/api/v1/positions")]);
-  fill("sites", sites.map((s) => [s.name, s.levels.join(", "), s.radio_map ?? "none", s.tracks]));
-  fill("tracks", features.map(({ properties: p }) => [
-    p.track, p.site, p.level, p.x?.toFixed(1) ?? "", p.y?.toFixed(1) ?? "", p.radius_m_95?.toFixed(1) ?? "", p.state,
-  ]));
-}
-
-async function keepShowing() {
-  try {
-    await show();
-    said.textContent = "";
-    setTimeout(keepShowing, 1000);
-  } catch (error) {
-    said.textContent = error.message;
+/** Ask for a token until one works; resolves with the sites it shows. */
+async function enter(said = "") {
+  const dialog = byId("login");
+  for (let text = said; ; ) {
+    if (hasToken() && !text) {
+      try {
+        return (await get("/api/v1/sites")).sites;
+      } catch (error) {
+        text = error.message;
+        if (!(error instanceof Refused)) throw error;
+      }
+    }
+    byId("login-said").textContent = text;
+    dialog.showModal();
+    await new Promise((done) => dialog.addEventListener("close", done, { once: true }));
+    keepToken(byId("token").value);
+    byId("token").value = "";
+    text = hasToken() ? "" : "A token is needed.";
   }
 }
 
-document.getElementById("login").addEventListener("submit", (event) => {
-  event.preventDefault();
-  token = document.getElementById("token").value.trim();
-  keepShowing();
-});
+function showConnection(state, error) {
+  const at = byId("connection");
+  at.dataset.state = state;
+  at.textContent = { on: "live", off: "connecting again", refused: "refused" }[state];
+  at.title = error?.message ?? "";
+}
+
+async function open(site) {
+  listening.abort();
+  listening = new AbortController();
+  await store.open(site);
+  document.title = `wayfuse: ${store.site}`;
+  listen(store.site, (event, data) => store.take(event, data), showConnection, listening.signal);
+}
+
+function startSites(sites) {
+  const select = byId("site");
+  select.replaceChildren(...sites.map((s) => el("option", { value: s.name, textContent: s.name })));
+  select.hidden = sites.length < 2;
+  document.querySelector("label.site").hidden = sites.length < 2;
+  select.addEventListener("change", () => open(select.value).catch((error) => notice(error.message)));
+}
+
+async function start() {
+  startTheme(byId("theme"));
+  const map = await IndoorMap.in(byId("map"));
+  map.onDot = (track) => store.select(track);
+  startDrawing(map);
+  startFloors(byId("floors"));
+  const replay = startReplay(byId("view-replay"), map);
+  const survey = startSurvey(byId("view-survey"), map);
+  startTracks(byId("view-tracks"), map, (track) => {
+    byId("tab-replay").click();
+    return replay.replay(track);
+  });
+  let before = "tab-tracks";
+  startTabs(document.querySelector("[role=tablist]"), (tab) => {
+    if (before === "tab-replay" && tab !== before) replay.left();
+    if (before === "tab-survey" && tab !== before) survey.left();
+    if (tab === "tab-replay") replay.opened();
+    if (tab === "tab-survey") survey.opened();
+    before = tab;
+  });
+  byId("leave").addEventListener("click", () => {
+    keepToken("");
+    location.reload();
+  });
+  const sites = await enter();
+  byId("leave").hidden = false;
+  startSites(sites);
+  if (sites.length) await open(sites[0].name);
+  else notice("This server has no site that the token may see.");
+}
+
+start().catch((error) => notice(error.message));

@@ -1,0 +1,98 @@
+// What the page knows: the site, its floors, everybody's track. Whoever draws listens for changes.
+
+import { get } from "/web/api.js";
+import { Frame } from "/web/frames.js";
+
+const TRAIL = 240; // places kept of each track
+const QUIET_S = 30; // without a word a track is drawn pale
+
+class Store extends EventTarget {
+  site = "";
+  floors = []; // { floor, level, frame, is_on_earth }
+  floor = 0;
+  selected = "";
+  following = true;
+  tracks = new Map(); // by name: { p (properties of its last position), trail, changed }
+  plans = new Map();
+  ahead = 0; // s, the server's clock before this one's
+
+  tell(what) {
+    this.dispatchEvent(new Event(what));
+  }
+
+  on(what, work) {
+    for (const each of what.split(" ")) this.addEventListener(each, work);
+  }
+
+  get now() {
+    return Date.now() / 1000 + this.ahead;
+  }
+
+  async open(site) {
+    const { site: name, floors } = await get("/api/v1/plan", { site });
+    this.site = name;
+    this.floors = floors.map((f) => ({ ...f, frame: new Frame(f) }));
+    this.tracks.clear();
+    this.plans.clear();
+    this.selected = "";
+    const ground = this.floors.findIndex((f) => f.elevation_m >= 0);
+    this.floor = Math.max(ground, 0);
+    this.tell("site");
+    this.tell("floor");
+    this.tell("select");
+  }
+
+  /** The plan of a floor, fetched once. */
+  async plan(floor) {
+    if (!this.plans.has(floor)) {
+      const of = get(`/api/v1/plan/${floor}`, { site: this.site });
+      this.plans.set(floor, of);
+      of.catch(() => this.plans.delete(floor));
+    }
+    return this.plans.get(floor);
+  }
+
+  showFloor(floor) {
+    if (floor === this.floor || !this.floors[floor]) return;
+    this.floor = floor;
+    this.tell("floor");
+  }
+
+  select(track, { follow = true } = {}) {
+    if (track !== this.selected) {
+      this.selected = track;
+      this.following = follow;
+      this.tell("select");
+    }
+    const at = this.tracks.get(track);
+    if (at && follow) this.showFloor(at.p.floor);
+  }
+
+  /** Take an event of the stream. */
+  take(event, data) {
+    if (event === "snapshot") for (const f of data) this.#place(f.properties, f.properties.n);
+    if (event === "position" && data.feature) {
+      const p = data.feature.properties;
+      this.ahead = p.heard - Date.now() / 1000;
+      this.#place(p, data.changed);
+    }
+    this.tell("tracks");
+  }
+
+  #place(p, changed) {
+    const known = this.tracks.get(p.track) ?? { trail: [] };
+    const trail = known.trail.filter((at) => at.n < Math.min(changed, p.n));
+    if (p.x !== null && p.state !== "initialising") trail.push({ n: p.n, t: p.t, floor: p.floor, x: p.x, y: p.y });
+    this.tracks.set(p.track, { p, trail: trail.slice(-TRAIL) });
+    if (p.track === this.selected && this.following) this.showFloor(p.floor);
+  }
+
+  isQuiet(p) {
+    return p.is_ended || this.now - p.heard > QUIET_S;
+  }
+}
+
+export const store = new Store();
+
+/** A name short enough for a map. */
+export const short = (track) => track.slice(0, 6);
