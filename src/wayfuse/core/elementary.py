@@ -86,6 +86,10 @@ def sincos_turn32(word: np.uint32) -> tuple[np.float32, np.float32]:
     half = np.float32(0.70710678)
     a = half * (s + c)
     b = half * (c - s)
-    sine = a if quadrant == 0 else (b if quadrant == 1 else (-a if quadrant == 2 else -b))
-    cosine = b if quadrant == 0 else (-a if quadrant == 1 else (-b if quadrant == 2 else a))
+    # choices between two values each: a chain of four is not vectorised
+    odd = (quadrant & np.int32(1)) != np.int32(0)
+    sine = b if odd else a
+    cosine = a if odd else b
+    sine = -sine if quadrant >= np.int32(2) else sine
+    cosine = -cosine if (quadrant == np.int32(1)) | (quadrant == np.int32(2)) else cosine
     return sine, cosine

@@ -2,9 +2,10 @@
 
 ``@kernel`` compiles a function of arrays and scalars with numba, caches the machine code on disk and releases the
 GIL. Kernels draw no random numbers of their own, take no options or strings and raise nothing: the wrapper
-validates, the kernel trusts. ``fastmath`` stays off, for it assumes that no infinity occurs; `fast_kernel` allows
-the re-association of sums (not the removal of NaN and infinity checks), where a loop is to be vectorised. Set
-``NUMBA_DISABLE_JIT=1`` to run every kernel as the plain Python it also is.
+validates, the kernel trusts. A division by zero gives an infinity, as in NumPy: a check for it, as Python has, would
+keep every loop with a division from being vectorised. ``fastmath`` stays off, for it assumes that no infinity occurs;
+`fast_kernel` allows the re-association of sums (not the removal of NaN and infinity checks), where a loop is to be
+vectorised. Set ``NUMBA_DISABLE_JIT=1`` to run every kernel as the plain Python it also is.
 """
 
 from __future__ import annotations
@@ -14,14 +15,14 @@ from typing import Any, TypeVar, cast
 
 import numba
 
-__all__ = ["fast_kernel", "inline_kernel", "kernel"]
+__all__ = ["bounded_kernel", "fast_kernel", "inline_kernel", "kernel"]
 
 F = TypeVar("F", bound=Callable[..., Any])
 
 
 def kernel(function: F) -> F:
     """Compile a kernel (cached on disk, GIL released, IEEE arithmetic)."""
-    return cast("F", numba.njit(cache=True, nogil=True, fastmath=False)(function))
+    return cast("F", numba.njit(cache=True, nogil=True, fastmath=False, error_model="numpy")(function))
 
 
 def fast_kernel(function: F) -> F:
@@ -30,6 +31,12 @@ def fast_kernel(function: F) -> F:
     return cast("F", numba.njit(cache=True, nogil=True, fastmath=flags, error_model="numpy")(function))
 
 
+def bounded_kernel(function: F) -> F:
+    """Compile a kernel whose arrays hold neither NaN nor infinity, as its caller sees to: greatest values vectorise."""
+    return cast("F", numba.njit(cache=True, nogil=True, fastmath=True, error_model="numpy")(function))
+
+
 def inline_kernel(function: F) -> F:
     """Compile a scalar helper that is inlined into the kernels that call it."""
-    return cast("F", numba.njit(cache=True, nogil=True, fastmath=False, inline="always")(function))
+    compiled = numba.njit(cache=True, nogil=True, fastmath=False, inline="always", error_model="numpy")
+    return cast("F", compiled(function))

@@ -21,7 +21,7 @@ from wayfuse.core.elementary import log32, sincos_turn32
 from wayfuse.core.jit import kernel
 from wayfuse.core.types import Array, Array32
 
-__all__ = ["Noise", "philox_words", "track_key"]
+__all__ = ["Noise", "box_muller", "philox_words", "track_key"]
 
 _M0 = np.uint64(0xD2511F53)
 _M1 = np.uint64(0xCD9E8D57)
@@ -59,8 +59,9 @@ def philox_words(
 
 
 @kernel
-def _normals(words: NDArray[np.uint32], out: Array32) -> None:
-    # Box-Muller; u lies on the middles of 2^24 equal parts of (0, 1), so the largest normal is 5.9
+def box_muller(words: NDArray[np.uint32], out: Array32) -> None:
+    """Fill ``out`` (4, n) with the standard normals of uniform words (4, n)."""
+    # u lies on the middles of 2^24 equal parts of (0, 1), so the largest normal is 5.9
     scale = np.float32(2.0**-24)
     for pair in range(2):
         for i in range(words.shape[1]):
@@ -109,7 +110,7 @@ class Noise:
     def normals(self, n: int) -> Array32:
         """(4, n) float32 standard normals; advances the draw."""
         out = np.empty((4, n), dtype=np.float32)
-        _normals(self.words(n), out)
+        box_muller(self.words(n), out)
         return out
 
     def uniforms(self, n: int) -> Array:

@@ -11,7 +11,14 @@ from wayfuse.core.elementary import exp32, log32, sincos32
 from wayfuse.core.jit import fast_kernel, kernel
 from wayfuse.core.types import Array, Array32
 
-__all__ = ["block_on_mask", "mixture_log_likelihood", "pdr_move"]
+__all__ = [
+    "add_levels",
+    "add_places",
+    "add_ranges",
+    "block_on_mask",
+    "mixture_log_likelihood",
+    "pdr_move",
+]
 
 
 @kernel
@@ -130,3 +137,74 @@ def mixture_log_likelihood(
             total[i] += w * exp32(half * (dx * dx + dy * dy)) * np.float32(floor[i] == f)
     for i in range(x.shape[0]):
         out[i] += exponent * log32(total[i])
+
+
+@fast_kernel
+def add_ranges(
+    x: Array32, y: Array32, anchors: Array32, ranges: Array32, precision: float, out: Array32
+) -> None:
+    """Add -p sum_a (d_a - |x - anchor a|)² to ``out`` (N,); anchors (A, 2) m, ranges d (A,) m, NaN = none; p 1/m²."""
+    # anchors in the outer loop: the inner one is vectorised over particles
+    p = np.float32(precision)
+    for a in range(len(anchors)):
+        ax, ay, d = anchors[a, 0], anchors[a, 1], ranges[a]
+        if not np.isnan(d):
+            for i in range(len(x)):
+                dx = x[i] - ax
+                dy = y[i] - ay
+                e = d - math.sqrt(dx * dx + dy * dy)
+                out[i] -= p * (e * e)
+
+
+@fast_kernel
+def add_levels(x: Array32, y: Array32, levels: Array32, frame: Array32, scan: Array32, out: Array32) -> None:
+    """Add sum_a h_a (log s_a - (z_a - m_a)² s_a² / 2) to ``out`` (N,): Gaussian readings on a grid, read bilinearly.
+
+    levels (nodes, 3, P): m dBm, s = 1 / sigma 1/dB, log s of P access points, padded to a multiple of 16; frame (5,):
+    x, y m of node 0, 1 / step 1/m, nodes per row, rows; scan (2, P): z dBm, h = 1 where heard, else 0.
+    """
+    columns, rows = int(frame[3]), int(frame[4])
+    p = scan.shape[1]
+    half = np.float32(0.5)
+    for i in range(len(x)):
+        u = min(max((x[i] - frame[0]) * frame[2], np.float32(0.0)), np.float32(columns - 1.001))
+        v = min(max((y[i] - frame[1]) * frame[2], np.float32(0.0)), np.float32(rows - 1.001))
+        j, k = int(u), int(v)
+        fu, fv = u - np.float32(j), v - np.float32(k)
+        a, b = levels[k * columns + j], levels[k * columns + j + 1]
+        c, d = levels[(k + 1) * columns + j], levels[(k + 1) * columns + j + 1]
+        wa, wb = (np.float32(1.0) - fu) * (np.float32(1.0) - fv), fu * (np.float32(1.0) - fv)
+        wc, wd = (np.float32(1.0) - fu) * fv, fu * fv
+        total = np.float32(0.0)
+        for q in range(p):
+            m = wa * a[0, q] + wb * b[0, q] + wc * c[0, q] + wd * d[0, q]
+            s = wa * a[1, q] + wb * b[1, q] + wc * c[1, q] + wd * d[1, q]
+            g = wa * a[2, q] + wb * b[2, q] + wc * c[2, q] + wd * d[2, q]
+            e = (scan[0, q] - m) * s
+            total += scan[1, q] * (g - half * e * e)
+        out[i] += total
+
+
+@fast_kernel
+def add_places(x: Array32, y: Array32, places: Array32, out: Array32) -> None:
+    """Add log sum_j exp(w_j - p_j |x - place j|²) to ``out`` (N,), finite wherever the particle is.
+
+    places (k, 4): x, y m, log-weight w (-1e9 = none), p 1/m².
+    """
+    n = len(x)
+    top, total = np.full(n, np.float32(-1e9)), np.zeros(n, np.float32)
+    for j in range(len(places)):
+        px, py, w, p = places[j, 0], places[j, 1], places[j, 2], places[j, 3]
+        for i in range(n):
+            dx = x[i] - px
+            dy = y[i] - py
+            t = w - p * (dx * dx + dy * dy)
+            top[i] = t if t > top[i] else top[i]
+    for j in range(len(places)):
+        px, py, w, p = places[j, 0], places[j, 1], places[j, 2], places[j, 3]
+        for i in range(n):
+            dx = x[i] - px
+            dy = y[i] - py
+            total[i] += exp32(w - p * (dx * dx + dy * dy) - top[i])
+    for i in range(n):
+        out[i] += top[i] + log32(total[i])
