@@ -2,11 +2,20 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from wayfuse.core.types import Array
-from wayfuse.radio.ap_hearing import fitted_levels, floor_log_shares, hear, is_5ghz, loudest_floor
+from wayfuse.radio.ap_hearing import (
+    fitted_levels,
+    floor_log_shares,
+    hear,
+    is_5ghz,
+    known_levels,
+    loudest_floor,
+)
 from wayfuse.radio.ap_places import ApPlaces
 from wayfuse.radio.path_loss import PathLoss
 from wayfuse.radio.survey import Fingerprint, Survey
@@ -78,3 +87,16 @@ def test_readings_from_other_floors_and_unplaced_access_points_do_not_count() ->
     partly = fitted_levels(survey(2.0), known, DEFAULT)
     assert partly.bands[1].attenuation == 0.25
     np.testing.assert_allclose(partly.power, POWER[:6], atol=1.0)
+
+
+def test_a_survey_tells_powers_else_the_places_do_else_nobody() -> None:
+    fitted = known_levels(survey(2.0), places(), DEFAULT)
+    assert fitted is not None
+    np.testing.assert_array_equal(fitted.power, fitted_levels(survey(2.0), places(), DEFAULT).power)
+    told = known_levels(None, replace(places(), power=np.where(np.arange(12) == 3, np.nan, POWER)), DEFAULT)
+    assert told is not None
+    assert told.power[3] == pytest.approx(np.delete(POWER, 3).mean())
+    np.testing.assert_array_equal(np.delete(told.power, 3), np.delete(POWER, 3))
+    assert [(band.power, band.attenuation) for band in told.bands] == [(0.0, 0.15), (0.0, 0.25)]
+    assert known_levels(None, places(), DEFAULT) is None
+    assert known_levels(None, replace(places(), power=np.full(12, np.nan)), DEFAULT) is None

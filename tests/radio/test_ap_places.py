@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -40,6 +41,11 @@ def test_what_is_written_is_read(tmp_path: Path, is_estimated: bool) -> None:
     other = read_ap_places(tmp_path / "aps.csv", FLOORS)
     same(one, other)
     assert (other.sigma is not None) == is_estimated
+    assert other.power is None
+    powered = replace(one, power=np.array([-40.0, np.nan, -51.25]))
+    write_ap_places(tmp_path / "aps.csv", powered, FLOORS)
+    np.testing.assert_allclose(read_ap_places(tmp_path / "aps.csv", FLOORS).power, powered.power)
+    np.testing.assert_allclose(powered.select(np.array([2])).power, [-51.25])
     if is_estimated:
         assert one.sigma is not None
         np.testing.assert_allclose(other.sigma, one.sigma)
@@ -88,10 +94,10 @@ def test_a_file_made_by_hand(tmp_path: Path) -> None:
         ("", ":1: the header lacks a column"),
         ("bssid,x,y\n", ":1: the header lacks a column"),
         (HEADER + "0a:00:00:00:00:01,1,2,F9,\n", ":2: floor 'F9' is none of the site's"),
-        (HEADER + "0a:00:00:00:00:01,1,2,F1,\n0a:00:00:00:00:02,,2,F1,\n", ":3: x '' is no length"),
-        (HEADER + "0a:00:00:00:00:01,1,nan,F1,\n", ":2: y 'nan' is no length"),
-        (HEADER + "0a:00:00:00:00:01,1,1e9,F1,\n", ":2: y '1e9' is no length"),
-        (HEADER + "0a:00:00:00:00:01,1,2,F1,high\n", ":2: height 'high' is no length"),
+        (HEADER + "0a:00:00:00:00:01,1,2,F1,\n0a:00:00:00:00:02,,2,F1,\n", ":3: x '' is no such number"),
+        (HEADER + "0a:00:00:00:00:01,1,nan,F1,\n", ":2: y 'nan' is no such number"),
+        (HEADER + "0a:00:00:00:00:01,1,1e9,F1,\n", ":2: y '1e9' is no such number"),
+        (HEADER + "0a:00:00:00:00:01,1,2,F1,high\n", ":2: height 'high' is no such number"),
         (HEADER + "0a:00:00:00:00:01,1,2,F1\n", ":2: 4 fields, the header has 5"),
         (HEADER + ",1,2,F1,\n", ":2: bssid is empty"),
         (
@@ -136,6 +142,7 @@ def test_rows_of_identifiers() -> None:
         {"bssid": np.ones(3, np.uint64)},
         {"floor": np.array([0, -1, 0], np.int32)},
         {"sigma": np.zeros(1)},
+        {"power": np.zeros(1)},
     ],
 )
 def test_columns_that_do_not_go_together_are_refused(wrong: dict[str, np.ndarray]) -> None:

@@ -97,12 +97,15 @@ class _Reader:
 def access_points_command(
     radio_map: Path, out: Path, min_places: int, most_sigma: float | None, as_json: bool
 ) -> None:
-    """Estimate where the access points of RADIO_MAP hang, and write bssid,x,y,floor,height,sigma.
+    """Estimate where the access points of RADIO_MAP hang, and write bssid,x,y,floor,height,sigma,power.
 
     They are estimates, and the file says so (its column sigma): measured places are better, where there are any.
     """
+    from dataclasses import replace
+
     from wayfuse.cli.work import check_target
     from wayfuse.radio.ap_estimation import EstimationParameters, estimate_places
+    from wayfuse.radio.ap_hearing import DEFAULT_BANDS, fitted_levels
     from wayfuse.radio.ap_places import write_ap_places
     from wayfuse.radio.walk_survey import load
 
@@ -111,7 +114,8 @@ def access_points_command(
     found = estimate_places(built, EstimationParameters(min_places=min_places))
     if most_sigma is not None and found.sigma is not None:
         found = found.select(found.sigma <= most_sigma)
-    write_ap_places(out, found, built.floors)
+    levels = fitted_levels(built, found, DEFAULT_BANDS)
+    write_ap_places(out, replace(found, power=levels.power), built.floors)
     _render_places(found, built, out, as_json)
 
 

@@ -11,7 +11,7 @@ from wayfuse.models.placed_start import AnywhereOnFloor, ToldStart
 from wayfuse.presets.fused import check_floors, prior_estimate
 from wayfuse.presets.karlsson2015 import Config
 from wayfuse.presets.liu2017_tracker import known_places
-from wayfuse.radio.ap_hearing import fitted_levels
+from wayfuse.radio.ap_hearing import known_levels
 from wayfuse.radio.ap_places import ApPlaces
 from wayfuse.radio.survey import Survey
 from wayfuse.tracking.dead_reckoning import Start
@@ -33,7 +33,8 @@ def build(
 ) -> Tracker[PlainState]:
     """The tracker of a site by the places of its access points; estimated from the survey where none are given.
 
-    Where there is a survey the path loss of each band is fitted to it, else it is that of the configuration. The
+    Where there is a survey the path loss of each band and the power of each access point are fitted to it; else the
+    path loss is that of the configuration, powers those that came with the places or else the configuration's. The
     heading at the start is always unknown; the start is, unless told, anywhere on the floor of the first scan.
 
     Raises
@@ -44,7 +45,7 @@ def build(
     if survey is not None:
         check_floors(site, survey)
     places = known_places(site, survey, places)
-    levels = None if survey is None else fitted_levels(survey, places, c.bands)
+    levels = known_levels(survey, places, c.bands)
     told = start and KnownStart(x=start.x, y=start.y, floor=start.floor, sigma=c.start_sigma, scale_sigma=0.0)
     walkable = tuple(floor.walkable for floor in site.floors)
     engine = PlainEngine(

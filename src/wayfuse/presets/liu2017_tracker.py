@@ -14,20 +14,15 @@ from wayfuse.models.placed_start import SequenceStart, ToldStart
 from wayfuse.presets.fused import prior_estimate
 from wayfuse.presets.liu2017 import Config
 from wayfuse.radio.ap_estimation import estimate_places
-from wayfuse.radio.ap_hearing import fitted_levels
+from wayfuse.radio.ap_hearing import DEFAULT_BANDS, known_levels
 from wayfuse.radio.ap_places import ApPlaces
-from wayfuse.radio.path_loss import PathLoss
 from wayfuse.radio.survey import Survey
 from wayfuse.tracking.dead_reckoning import Start
 from wayfuse.tracking.plain_engine import PlainEngine, PlainState
 from wayfuse.tracking.tracker import Tracker
 
-__all__ = ["build"]
+__all__ = ["build", "known_places"]
 
-_BANDS = (
-    PathLoss(-40.0, 0.2, 6.0),
-    PathLoss(-40.0, 0.2, 6.0),
-)  # where a survey has hardly any reading of a band
 _PERIOD = 2.0  # s, between the scans of the paper, for which `walk_sigma` is
 
 
@@ -51,6 +46,7 @@ def build(
     """
     c = config or Config()
     places = known_places(site, survey, places)
+    levels = known_levels(survey, places, DEFAULT_BANDS)
     observation = SequenceLikelihood(
         places=places,
         extents=tuple((0.0, 0.0, floor.width, floor.height) for floor in site.floors),
@@ -58,7 +54,7 @@ def build(
         k=c.k,
         precision=c.precision,
         most=c.most,
-        power=fitted_levels(survey, places, _BANDS).power if survey is not None and c.levelled else None,
+        power=levels.power if levels is not None and c.levelled else None,
     )
     told = start and KnownStart(
         x=start.x,

@@ -14,7 +14,17 @@ from wayfuse.radio.ap_places import ApPlaces
 from wayfuse.radio.path_loss import PathLoss
 from wayfuse.radio.survey import Fingerprint, Survey
 
-__all__ = ["Heard", "Levels", "fitted_levels", "floor_log_shares", "hear", "is_5ghz", "loudest_floor"]
+__all__ = [
+    "DEFAULT_BANDS",
+    "Heard",
+    "Levels",
+    "fitted_levels",
+    "floor_log_shares",
+    "hear",
+    "is_5ghz",
+    "known_levels",
+    "loudest_floor",
+]
 
 _N_FLOOR = 3  # loudest readings that tell a floor
 _SILENCE = -100.0  # dBm that stands for a reading that is not there
@@ -23,6 +33,10 @@ _FIRST_5GHZ = 4900  # MHz
 _LEAST_READINGS = 30  # of a band, for a fit
 _NEAREST = 1.0  # m, as in `path_loss`
 _LEAST_SIGMA = 1.0  # dB; a survey that is fitted better is not believed
+
+
+# of a band that a survey has hardly any reading of: power (dBm at 1 m), attenuation (dB/m), sigma (dB)
+DEFAULT_BANDS = (PathLoss(-40.0, 0.2, 6.0), PathLoss(-40.0, 0.2, 6.0))
 
 
 class Heard(NamedTuple):
@@ -96,6 +110,17 @@ def fitted_levels(survey: Survey, places: ApPlaces, default: tuple[PathLoss, ...
     heard = np.isfinite(power)
     middle = float(power[heard].mean()) if heard.any() else default[0].power
     return Levels(tuple(bands), np.where(heard, power, middle))
+
+
+def known_levels(survey: Survey | None, places: ApPlaces, default: tuple[PathLoss, ...]) -> Levels | None:
+    """Levels fitted to a survey, else by the powers that came with the places; None where there are neither."""
+    if survey is not None:
+        return fitted_levels(survey, places, default)
+    if places.power is None or not np.isfinite(places.power).any():
+        return None
+    middle = float(np.nanmean(places.power))
+    bands = tuple(replace(band, power=0.0) for band in default)
+    return Levels(bands, np.where(np.isfinite(places.power), places.power, middle))
 
 
 def _fitted(away: Array, rssi: Array, place: NDArray[np.int64]) -> PathLoss:

@@ -1,9 +1,10 @@
 """Where access points hang: known from a plan, or estimated from a survey (`radio.ap_estimation`).
 
 Read and written as a CSV with the header ``bssid,x,y,floor,height``: places in metres of the frame of the floor, floors
-by name, height above that floor empty where nobody measured it. Estimated places carry a sixth column, ``sigma``, the
-standard deviation of the place in metres; a file that has it holds estimates, and methods say so. This file is made by
-hand or by a command, so a damaged line is an error of use that names file and line, not bad data.
+by name, height above that floor empty where nobody measured it. Estimated places carry a further column, ``sigma``,
+the standard deviation of the place in metres; a file that has it holds estimates, and methods say so. A column
+``power`` has the level at 1 m in dBm, where known. This file is made by hand or by a command, so a damaged line is an
+error of use that names file and line, not bad data.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,11 +27,13 @@ from wayfuse.sensors.records import bssid_id, bssid_text
 __all__ = ["ApPlaces", "read_ap_places", "write_ap_places"]
 
 _HEADER = ("bssid", "x", "y", "floor", "height")
-_SIGMA = "sigma"
+_SIGMA, _POWER = "sigma", "power"
 _HASHED = 1 << 63  # marks a digest, as `bssid_text` takes it off
 _DIGEST_DIGITS = 16
 _FARTHEST = 1e5  # m; no building frame reaches so far
-_Row: TypeAlias = tuple[int, float, float, int, float, float]  # bssid, x, y, floor, height, sigma
+_Row: TypeAlias = tuple[
+    int, float, float, int, float, float, float
+]  # bssid, x, y, floor, height, sigma, power
 _REMEDY = "give bssid,x,y,floor,height: metres of the floor's frame, the floor's name, height may be empty"
 
 
@@ -41,6 +44,7 @@ class ApPlaces:
     bssid : (n,) identifiers, each once. x, y : (n,) m, frame of the floor. floor : (n,) index into the site's floors.
     height : (n,) m above that floor, NaN where unknown. is_estimated : estimated from readings, not measured.
     sigma : (n,) m, standard deviation of an estimated place, NaN where unknown; None for measured places.
+    power : (n,) dBm at 1 m, NaN where unknown; None where nobody knows any.
     """
 
     bssid: IdArray
@@ -50,9 +54,11 @@ class ApPlaces:
     height: Array
     is_estimated: bool = False
     sigma: Array | None = None
+    power: Array | None = None
 
     def __post_init__(self) -> None:
-        columns = (self.x, self.y, self.floor, self.height, *(() if self.sigma is None else (self.sigma,)))
+        known = [column for column in (self.sigma, self.power) if column is not None]
+        columns: list[NDArray[Any]] = [self.x, self.y, self.floor, self.height, *known]
         if self.bssid.ndim != 1 or any(column.shape != self.bssid.shape for column in columns):
             raise ConfigError("columns of different lengths", where="ApPlaces")
         if len(np.unique(self.bssid)) != len(self.bssid):
@@ -80,13 +86,19 @@ class ApPlaces:
     def select(self, rows: NDArray[np.integer] | NDArray[np.bool_]) -> ApPlaces:
         """Some of them."""
         return ApPlaces(
-            self.bssid[rows], self.x[rows], self.y[rows], self.floor[rows], self.height[rows],
-            self.is_estimated, None if self.sigma is None else self.sigma[rows],
-        )  # fmt: skip
+            self.bssid[rows],
+            self.x[rows],
+            self.y[rows],
+            self.floor[rows],
+            self.height[rows],
+            self.is_estimated,
+            None if self.sigma is None else self.sigma[rows],
+            None if self.power is None else self.power[rows],
+        )
 
 
 def read_ap_places(path: str | PathLike[str], floor_names: Sequence[str]) -> ApPlaces:
-    """Read a CSV of places; columns in any order, ``height`` and ``sigma`` may be missing.
+    """Read a CSV of places; columns in any order, ``height``, ``sigma`` and ``power`` may be missing.
 
     Raises
     ------
@@ -121,7 +133,7 @@ def read_ap_places(path: str | PathLike[str], floor_names: Sequence[str]) -> ApP
                 f"bssid {bssid_text(row[0])} is in line {first} already", where=where, remedy="keep one"
             )
         rows.append(row)
-    return _places(rows, is_estimated=_SIGMA in header)
+    return _places(rows, is_estimated=_SIGMA in header, has_power=_POWER in header)
 
 
 def _row(fields: Mapping[str, str], floors: Mapping[str, int], where: str) -> _Row:
@@ -133,10 +145,12 @@ def _row(fields: Mapping[str, str], floors: Mapping[str, int], where: str) -> _R
             where=where,
             remedy=f"one of {', '.join(floors)}",
         )
-    x, y, height, sigma = (_number(fields, name, where) for name in ("x", "y", "height", _SIGMA))
+    x, y, height, sigma, power = (
+        _number(fields, name, where) for name in ("x", "y", "height", _SIGMA, _POWER)
+    )
     if sigma < 0.0:
         raise FormatError(f"sigma {sigma} is negative", where=where, remedy="a standard deviation in metres")
-    return _identifier(fields["bssid"]), x, y, floors[fields["floor"]], height, sigma
+    return _identifier(fields["bssid"]), x, y, floors[fields["floor"]], height, sigma, power
 
 
 def _identifier(text: str) -> int:
@@ -159,16 +173,17 @@ def _number(fields: Mapping[str, str], name: str, where: str) -> float:
     except ValueError:
         value = math.nan
     if not abs(value) <= _FARTHEST:
-        raise FormatError(f"{name} {text!r} is no length in metres", where=where, remedy=_REMEDY)
+        raise FormatError(f"{name} {text!r} is no such number", where=where, remedy=_REMEDY)
     return value
 
 
-def _places(rows: Sequence[_Row], *, is_estimated: bool) -> ApPlaces:
-    numbers = np.array([row[1:] for row in rows], dtype=np.float64).reshape(-1, 5)
-    x, y, floor, height, sigma = numbers.T
+def _places(rows: Sequence[_Row], *, is_estimated: bool, has_power: bool) -> ApPlaces:
+    numbers = np.array([row[1:] for row in rows], dtype=np.float64).reshape(-1, 6)
+    x, y, floor, height, sigma, power = numbers.T
+    bssid = np.array([row[0] for row in rows], np.uint64)
     return ApPlaces(
-        np.array([row[0] for row in rows], np.uint64), x, y, floor.astype(np.int32), height,
-        is_estimated, sigma if is_estimated else None,
+        bssid, x, y, floor.astype(np.int32), height, is_estimated,
+        sigma if is_estimated else None, power if has_power else None,
     )  # fmt: skip
 
 
@@ -190,12 +205,21 @@ def write_ap_places(path: str | PathLike[str], places: ApPlaces, floor_names: Se
         )
     with target.open("w", newline="", encoding="utf-8") as stream:
         out = csv.writer(stream, lineterminator="\n")
-        sigma = np.full(len(places), np.nan) if places.sigma is None else places.sigma
-        out.writerow((*_HEADER, _SIGMA) if places.is_estimated else _HEADER)
+        further = _further(places)
+        out.writerow((*_HEADER, *further))
         for row in range(len(places)):
-            fields = [bssid_text(int(places.bssid[row])), _text(places.x[row]), _text(places.y[row]),
-                      floor_names[int(places.floor[row])], _text(places.height[row])]  # fmt: skip
-            out.writerow([*fields, _text(sigma[row])] if places.is_estimated else fields)
+            numbers = (places.x, places.y, places.height, *further.values())
+            x, y, height, *rest = (_text(column[row]) for column in numbers)
+            out.writerow(
+                (bssid_text(int(places.bssid[row])), x, y, floor_names[int(places.floor[row])], height, *rest)
+            )
+
+
+def _further(places: ApPlaces) -> dict[str, Array]:
+    """The columns that not every file has."""
+    sigma = np.full(len(places), np.nan) if places.sigma is None else places.sigma
+    out = {_SIGMA: sigma} if places.is_estimated else {}
+    return out if places.power is None else {**out, _POWER: places.power}
 
 
 def _text(value: float) -> str:
