@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,11 +11,13 @@ import pytest
 
 from wayfuse.core.errors import ConfigError
 from wayfuse.core.types import Array
+from wayfuse.evaluation.estimates_file import read_estimates
 from wayfuse.maps.site import Site
 from wayfuse.sensors.recording import Recording
 from wayfuse.simulator.channel_state import ChannelModel
+from wayfuse.simulator.errands import errands
 from wayfuse.simulator.experiment import Plan, World, make_world, plan_walks, simulate_plan
-from wayfuse.simulator.experiment_files import check_formats, write_access_points
+from wayfuse.simulator.experiment_files import check_formats, write_access_points, write_tables, write_walk
 from wayfuse.simulator.hall import hall
 from wayfuse.simulator.house_site import site_of
 from wayfuse.simulator.imu import ImuModel
@@ -311,3 +314,47 @@ def test_a_survey_is_throttled_only_where_it_is_said():
             wifi = simulate_plan(world, plan).recording.wifi
             fresh = {float(s.last_seen.max()) for s in wifi}
             assert (len(fresh) <= 2) == (throttled or plan.role == "walk")
+
+
+def test_floors_and_phones_of_any_name_give_files_and_tables_that_read_back(tmp_path):
+    name = 'ground, "left"/hall'
+    building = hall(30.0, 20.0, 1)
+    odd = replace(building, storeys=(replace(building.storeys[0], name=name),))
+    site_of(odd).save(tmp_path / "SITE")
+    scenario = replace(
+        SMALL,
+        site=SitePart(folder="SITE"),
+        phone=PhonePart(models=(PhoneModel(name="a, b"),)),
+        csi=ChannelModel(),
+    )
+    _, world = make_world(scenario, 1, tmp_path)
+    for part in ("survey", "walks", "truth"):
+        (tmp_path / part).mkdir()
+    done = [write_walk(world, plan, tmp_path) for plan in plan_walks(world)]
+    write_tables(tmp_path, done)
+    write_access_points(tmp_path / "aps.csv", world, world.before)
+    for file, column, value in (
+        ("truth.csv", "floor", name),
+        ("walks.csv", "phone", "a, b"),
+        ("aps.csv", "floor", name),
+    ):
+        rows = list(csv.DictReader((tmp_path / file).read_text(encoding="utf-8").splitlines()))
+        assert {row[column] for row in rows} == {value}
+    assert {t.walk for t in read_estimates(tmp_path / "truth.csv").tracks} == {one.name for one in done}
+
+
+@pytest.mark.real_data
+@pytest.mark.slow
+def test_a_real_site_can_be_walked_in(ms_indoor):
+    from wayfuse.maps.importers.ms_indoor import import_site
+
+    site, _ = import_site(ms_indoor)
+    building, shift = building_of(site)
+    assert [s.name for s in building.storeys] == list(site.floor_names)
+    rng = np.random.default_rng(0)
+    for k, (storey, floor) in enumerate(zip(building.storeys, site.floors, strict=True)):
+        assert len(storey.nodes) > 50
+        assert len(storey.rooms) > 20
+        way = errands(building, k, 80.0, rng, wander=0.0, pause_share=0.0)
+        xy = np.array([way.start[:2], *[leg.stretch[:2] for leg in way.legs]]) + shift[k]
+        assert floor.walkable.contains(*xy.T).all()

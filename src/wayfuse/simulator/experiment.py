@@ -15,6 +15,7 @@ import numpy as np
 from wayfuse.core.errors import ConfigError
 from wayfuse.core.types import Array
 from wayfuse.maps.site import Site
+from wayfuse.maps.store import file_stems
 from wayfuse.sensors.recording import Recording
 from wayfuse.sensors.records import Waypoint
 from wayfuse.simulator.building import Building, shopping_centre
@@ -188,13 +189,14 @@ def _survey_plans(world: World) -> list[Plan]:
     phone = names.index(scenario.survey.phone) if scenario.survey.phone else 0
     numbers = _numbers(scenario, "survey", phone)
     visits = [np.zeros(len(storey.edges), dtype=np.int64) for storey in storeys]
+    stems = file_stems(tuple(storey.name for storey in storeys))
     plans = []
     for i in range(scenario.survey.walks):
         key, k = (world.seed, _SURVEY, i), i % len(storeys)
         rng = np.random.default_rng((*key, _PLAN))
         person = draw_person(numbers.walker, rng)
         journey = _stay(world, numbers, k, person, rng, visits[k])
-        plans.append(Plan(f"survey-{storeys[k].name}-{i:03d}", "survey", key, phone, person, journey))
+        plans.append(Plan(f"survey-{stems[k]}-{i:03d}", "survey", key, phone, person, journey))
     for i in range(len(world.building.passages) if scenario.survey.connectors else 0):
         key = (world.seed, _WAYS, i)
         rng = np.random.default_rng((*key, _PLAN))

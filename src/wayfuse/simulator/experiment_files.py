@@ -113,7 +113,7 @@ def write_access_points(path: Path, world: World, site: SimulatedSite) -> None:
         floor = int(radios.ap_floor[ap])
         x, y = (radios.ap_xy[ap] + world.shift[floor]).tolist()
         height = radios.model.ap_height
-        rows.append(f"{bssid_text(bssid)},{x:.3f},{y:.3f},{radios.storeys[floor].name},{height:.2f}")
+        rows.append(f"{bssid_text(bssid)},{x:.3f},{y:.3f},{_cell(radios.storeys[floor].name)},{height:.2f}")
     _write_text(path, "\n".join(rows) + "\n")
 
 
@@ -165,10 +165,10 @@ def _row(world: World, made: SimulatedWalk) -> str:
     cells = [
         made.plan.name,
         made.plan.role,
-        recording.device.model,
+        _cell(recording.device.model),
         f"{truth.t[-1]:.2f}",
         f"{float(truth.step_length.sum()):.1f}",
-        " ".join(passed),
+        _cell(" ".join(passed)),
         *(str(len(events)) for events in (recording.wifi, recording.ranges, recording.csi)),
     ]
     return ",".join(cells)
@@ -179,7 +179,7 @@ def _changes(floor: np.ndarray) -> np.ndarray:
 
 
 def _truth_rows(world: World, made: SimulatedWalk) -> str:
-    truth, storeys = made.truth, world.building.storeys
+    truth, names = made.truth, [_cell(storey.name) for storey in world.building.storeys]
     step = round(100.0 / world.scenario.output.truth_hz)  # of the grid of 100 Hz
     rows = []
     for k in range(0, len(truth.t), step):
@@ -188,7 +188,7 @@ def _truth_rows(world: World, made: SimulatedWalk) -> str:
         lon, lat = world.building.anchor.to_lonlat(truth.xy[k]).tolist()
         degrees = f"{lat:.8f},{lon:.8f}" if world.georeferenced else ","
         doing = Activity(int(truth.activity[k])).name.lower()
-        place = f"{x:.3f},{y:.3f},{storeys[floor].name},{degrees},{truth.z[k]:.3f},{truth.heading[k]:.4f}"
+        place = f"{x:.3f},{y:.3f},{names[floor]},{degrees},{truth.z[k]:.3f},{truth.heading[k]:.4f}"
         rows.append(f"{made.plan.name},{1000.0 * truth.t[k]:.0f},{place},{doing}")
     return "\n".join(rows)
 
@@ -197,6 +197,11 @@ def _places(made: SimulatedWalk) -> tuple[tuple[float, float, int], ...]:
     step = round(100.0 * _PICTURE_S)
     xy, floor = made.truth.xy[::step].tolist(), made.truth.floor[::step].tolist()
     return tuple((x, y, k) for (x, y), k in zip(xy, floor, strict=True))
+
+
+def _cell(text: str) -> str:
+    """A text as a cell of CSV."""
+    return '"' + text.replace('"', '""') + '"' if any(c in text for c in ',"\n\r') else text
 
 
 def _write_text(path: Path, text: str) -> None:
