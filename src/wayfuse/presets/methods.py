@@ -94,12 +94,12 @@ def _build_paper(
     n_particles: int | None,
     lag: float,
 ) -> Tracker[Any]:
-    """A published system: presets/<name>.py has its numbers, presets/<name>_tracker.py puts it together."""
-    config = import_module(f"wayfuse.presets.{name}").Config()
+    """A published system, put together in presets/<name>_tracker.py."""
+    module = import_module(f"wayfuse.presets.{name}_tracker")
+    config = module.Config()
     if n_particles is not None:
         config = replace(config, n_particles=n_particles)
-    build = import_module(f"wayfuse.presets.{name}_tracker").build
-    tracker: Tracker[Any] = build(site, survey, places=places, start=start, config=config, lag=lag)
+    tracker: Tracker[Any] = module.build(site, survey, places=places, start=start, config=config, lag=lag)
     return tracker
 
 
