@@ -121,50 +121,89 @@ def sepf(
     kidnapped: Mapping[int, tuple[float, float, int]] | None = None,
 ) -> Said:
     """The thesis' filter. kidnapped : second to the place (x m, y m, floor) where all particles are put in it."""
-    key, plain = track_key(seed, "sepf"), ParticleFilter(ess_ratio=1.0)
-    walls = Barriers(tuple(f.barrier_index for f in site.floors), c.wall_penalty)
-    motion = StepDisc(r_max=c.r_max)
-    filter_ = WideningFilter(wider=scaling("r_max"), rounds=c.rounds, filter=plain)
-    floors = FloorChange(
-        connectors=ConnectorMotion(site=site, leave_stairs=1.0, leave_lift=1.0),
-        steps=cast("PdrMotion", motion),
-        filter=plain,
-        constraint=walls,
-    )
-    first, observation = _anywhere(site), MapLikelihood(radio_map=radio_map)
-    likely = LikelyPlaces(radio_map=radio_map, walls=walls)
-    relocation = Relocation(first=likely) if c.recovery else None
-    state, movement, speed, share, said = None, Movement(), SpeedState(), 0.0, []
+    system, first = _Sepf(site, radio_map, c, track_key(seed, "sepf")), _anywhere(site)
+    track, said = None, []
     for t, second in enumerate(seconds):
-        state = _begun(key, state, first, second, c.n_particles)
-        if state is not None:
-            if kidnapped and t in kidnapped:
-                state, movement = _put(state, kidnapped[t]), Movement()
-            for event in second.vertical:  # S(t), E(t)
-                state, movement = floors.report(key, state, movement, event)
-            if second.step is not None:  # H(t)
-                after, _ = filter_.predict(key, state, motion, second.step, walls)
-                state, movement = floors.step(key, state, after, movement, float(t), second.step)
-                if c.speed is not None:
-                    speed = c.speed.stepped(speed, *second.step)
-            if c.speed is not None and (disc := c.speed.disc(speed, float(t))) is not None:
+        state = _begun(system.key, None if track is None else track.state, first, second, c.n_particles)
+        if state is None:
+            said.append(_estimate(None, len(site.floors)))
+            continue
+        track = _Track(state) if track is None else track
+        if kidnapped and t in kidnapped:
+            track = track._replace(state=_put(state, kidnapped[t]), movement=Movement())
+        track = system.move(track, float(t), second)
+        track, share = system.weigh(track, second)
+        said.append(_estimate(track.state, len(site.floors)))
+        track = system.resample(track, float(t), second, said[-1], share)
+    return _said(said)
+
+
+class _Track(NamedTuple):
+    """What SEPF knows of a track."""
+
+    state: FilterState
+    movement: Movement = Movement()
+    speed: SpeedState = SpeedState()
+
+
+class _Sepf:
+    """The modules of Figure 3.1: particle sampling, filtering, weighting, resampling; and ours, relocation."""
+
+    def __init__(self, site: Site, radio_map: InterpolatedMap, c: Config, key: tuple[int, int]) -> None:
+        self.key, self.c, self.plain = key, c, ParticleFilter(ess_ratio=1.0)
+        self.walls = Barriers(tuple(f.barrier_index for f in site.floors), c.wall_penalty)
+        self.motion = StepDisc(r_max=c.r_max)
+        self.filter = WideningFilter(wider=scaling("r_max"), rounds=c.rounds, filter=self.plain)
+        self.floors = FloorChange(
+            connectors=ConnectorMotion(site=site, leave_stairs=1.0, leave_lift=1.0),
+            steps=cast("PdrMotion", self.motion),
+            filter=self.plain,
+            constraint=self.walls,
+        )
+        self.observation = MapLikelihood(radio_map=radio_map)
+        likely = LikelyPlaces(radio_map=radio_map, walls=self.walls)
+        self.relocation = Relocation(first=likely) if c.recovery else None
+
+    def move(self, track: _Track, t: float, second: Second) -> _Track:
+        """Sampling (3.2) and filtering (3.3)."""
+        state, movement, speed = track
+        for event in second.vertical:  # S(t), E(t)
+            state, movement = self.floors.report(self.key, state, movement, event)
+        if second.step is not None:  # H(t)
+            after, _ = self.filter.predict(self.key, state, self.motion, second.step, self.walls)
+            state, movement = self.floors.step(self.key, state, after, movement, t, second.step)
+        if self.c.speed is not None:
+            if second.step is not None:
+                speed = self.c.speed.stepped(speed, *second.step)
+            disc = self.c.speed.disc(speed, t)
+            if disc is not None:
                 log_weights = state.log_weights.copy()
                 disc.restrict(state.cloud, state.cloud, log_weights)
                 state = state._replace(log_weights=log_weights)
-            if second.scan is not None:
-                weights = np.zeros(c.n_particles)
-                observation.log_likelihood(state.cloud, second.scan, weights)
-                if relocation is not None and movement.event is None:
-                    share = relocation.share(state, second.scan, weights)
-                state = state._replace(log_weights=state.log_weights + weights)
-        said.append(_estimate(state, len(site.floors)))
-        if state is not None:
-            if c.speed is not None:
-                speed = c.speed.estimated(speed, float(t), *said[-1])
-            state, _ = plain.update(key, state, np.zeros(c.n_particles), always_resample=True)
-            if relocation is not None and second.scan is not None and movement.event is None:
-                state = relocation.renew(key, state, second.scan, share)
-    return _said(said)
+        return _Track(state, movement, speed)
+
+    def weigh(self, track: _Track, second: Second) -> tuple[_Track, float]:
+        """Weighting (3.4), and the share of particles to draw afresh after resampling."""
+        state = track.state
+        if second.scan is None:
+            return track, 0.0
+        weights, share = np.zeros(state.cloud.n), 0.0
+        self.observation.log_likelihood(state.cloud, second.scan, weights)
+        if self.relocation is not None and track.movement.event is None:
+            share = self.relocation.share(state, second.scan, weights)
+        return track._replace(state=state._replace(log_weights=state.log_weights + weights)), share
+
+    def resample(
+        self, track: _Track, t: float, second: Second, said: tuple[float, float, int], share: float
+    ) -> _Track:
+        """Resampling (3.5) in every round, and relocation."""
+        speed = track.speed if self.c.speed is None else self.c.speed.estimated(track.speed, t, *said)
+        state, _ = self.plain.update(
+            self.key, track.state, np.zeros(track.state.cloud.n), always_resample=True
+        )
+        if self.relocation is not None and second.scan is not None and track.movement.event is None:
+            state = self.relocation.renew(self.key, state, second.scan, share)
+        return _Track(state, track.movement, speed)
 
 
 def _anywhere(site: Site) -> Anywhere:
