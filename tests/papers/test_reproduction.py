@@ -13,7 +13,7 @@ from wayfuse.core.errors import UsageError
 from wayfuse.evaluation.results_bars import at_most
 from wayfuse.papers import reproduction
 from wayfuse.papers.reproduction import (
-    PAPERS,
+    EXPERIMENTS,
     Interval,
     Reproduction,
     Table,
@@ -44,7 +44,7 @@ def test_the_interval_is_that_of_the_mean() -> None:
 
 
 def test_an_unknown_paper_is_an_error_that_lists_the_known() -> None:
-    with pytest.raises(UsageError, match="no paper 'smith2020'.*" + ", ".join(PAPERS)):
+    with pytest.raises(UsageError, match="no paper 'smith2020'.*" + ", ".join(EXPERIMENTS)):
         paper("smith2020")
 
 

@@ -30,22 +30,17 @@ def reproduce(
 ) -> None:
     """Run the experiments of a published system and print the paper's figures against ours.
 
-    PRESET is chu2009, he2014, karlsson2015, li2015, liu2017, or `all`. The exit status is 1 when a bar does not hold.
+    PRESET is chu2009, he2014, karlsson2015, li2015, liu2017, comparison (all of them and `fused` on the same walks), or
+    `all`. The exit status is 1 when a bar does not hold.
     """
     import json
 
     from wayfuse.cli.results import make_mapper
-    from wayfuse.core.errors import UsageError
-    from wayfuse.papers.reproduction import PAPERS, page, paper, write_pictures
+    from wayfuse.papers.reproduction import EXPERIMENTS, page, paper, write_pictures
 
     done = []
-    for name in PAPERS if preset == "all" else (preset,):
-        try:
-            module = paper(name)
-        except UsageError:
-            if preset != "all":
-                raise
-            continue
+    for name in EXPERIMENTS if preset == "all" else (preset,):
+        module = paper(name)
         result = module.reproduce(tuple(range(seeds or module.SEEDS)), make_mapper(jobs))
         done.append(result)
         for line in _lines(result):

@@ -19,9 +19,10 @@ from numpy.typing import ArrayLike
 from wayfuse.core.errors import UsageError
 from wayfuse.evaluation.results_bars import Bar
 from wayfuse.evaluation.results_folds import Mapper
+from wayfuse.presets.catalogue import PAPERS
 
 __all__ = [
-    "PAPERS",
+    "EXPERIMENTS",
     "Curve",
     "Interval",
     "Paper",
@@ -33,7 +34,7 @@ __all__ = [
     "write_pictures",
 ]
 
-PAPERS = ("chu2009", "he2014", "karlsson2015", "li2015", "liu2017")
+EXPERIMENTS = (*PAPERS, "comparison")  # the last has all systems on the same walks
 _STUDENT = 1.645  # of a normal: two sides, 90 %; with 20 seeds and more Student's differs by less than 5 %
 
 
@@ -105,20 +106,15 @@ class Paper(Protocol):
 
 
 def paper(name: str) -> Paper:
-    """The module of a preset.
+    """The module of an experiment of `EXPERIMENTS`.
 
     Raises
     ------
-    UsageError : there is no such paper, or it is not reproduced yet.
+    UsageError : there is no such experiment.
     """
-    if name not in PAPERS:
-        raise UsageError(f"no paper {name!r}", where="PRESET", remedy=f"one of {', '.join(PAPERS)}")
-    try:
-        return cast("Paper", import_module(f"wayfuse.papers.{name}"))
-    except ModuleNotFoundError as error:
-        if error.name != f"wayfuse.papers.{name}":
-            raise
-        raise UsageError(f"{name} is not reproduced yet", where="PRESET", remedy="choose another") from error
+    if name not in EXPERIMENTS:
+        raise UsageError(f"no paper {name!r}", where="PRESET", remedy=f"one of {', '.join(EXPERIMENTS)}")
+    return cast("Paper", import_module(f"wayfuse.papers.{name}"))
 
 
 def write_pictures(module: Paper, result: Reproduction, folder: Path) -> list[Path]:
