@@ -183,29 +183,29 @@ def training_places(
     floor = np.zeros(p, np.int32)
     floor[label] = survey.floor
     pair = np.repeat(label, np.diff(survey.indptr)) * m + survey.indices
-    count, average = _histogram_average(pair, survey.rssi.astype(np.float64), p * m, outlier)
-    often = count.reshape(p, m) >= np.maximum(rare * n_samples[:, None], 1.0)
-    levels = np.where(often, average.reshape(p, m), np.nan)
-    return TrainingPlaces(xy, floor, levels, n_samples)
+    pairs, count, average = _histogram_average(pair, survey.rssi.astype(np.float64), outlier)
+    often = count >= np.maximum(rare * n_samples[pairs // m], 1.0)
+    levels = np.full(p * m, np.nan)
+    levels[pairs[often]] = average[often]
+    return TrainingPlaces(xy, floor, levels.reshape(p, m), n_samples)
 
 
 def _histogram_average(
-    pair: NDArray[np.int64], rssi: Array, n_pairs: int, outlier: float
-) -> tuple[Array, Array]:
-    """Readings of each pair (place, access point), and the mean over its bins of 1 dB that hold enough of them."""
-    count = np.bincount(pair, minlength=n_pairs)
+    pair: NDArray[np.int64], rssi: Array, outlier: float
+) -> tuple[NDArray[np.int64], NDArray[np.int64], Array]:
+    """The pairs (place, access point) there are, ascending; readings of each; mean over its bins that hold enough."""
+    pairs, of = np.unique(pair, return_inverse=True)
+    count = np.bincount(of)
     at_bin = np.round(rssi).astype(np.int64)
     low = int(at_bin.min())
     width = int(at_bin.max()) - low + 1
-    bins, which, held = np.unique(pair * width + (at_bin - low), return_inverse=True, return_counts=True)
+    bins, which, held = np.unique(of * width + (at_bin - low), return_inverse=True, return_counts=True)
     of_pair = bins // width
-    most = np.zeros(n_pairs, np.int64)
-    np.maximum.at(most, of_pair, held)
+    most = np.maximum.reduceat(held, np.searchsorted(of_pair, np.arange(len(pairs))))
     enough = (held >= outlier * count[of_pair]) | (held == most[of_pair])
     # readings keep their fraction: a survey may have been shifted between phones
-    total = np.bincount(of_pair, np.bincount(which.ravel(), rssi, len(bins)) * enough, n_pairs)
-    kept = np.bincount(of_pair, held * enough, n_pairs)
-    return count.astype(np.float64), np.divide(total, kept, out=np.full(n_pairs, np.nan), where=kept > 0)
+    total = np.bincount(of_pair, np.bincount(which, rssi, len(bins)) * enough, len(pairs))
+    return pairs, count, total / np.bincount(of_pair, held * enough, len(pairs))
 
 
 def _table(xy: Array, rows: NDArray[np.int64], step: float) -> FloorTable:
