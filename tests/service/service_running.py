@@ -1,8 +1,9 @@
-"""A server in a process of its own, as `wayfuse serve` starts it."""
+"""Servers for tests: in a process of its own, as `wayfuse serve` starts it, and in this process."""
 
 from __future__ import annotations
 
 import os
+import secrets
 import signal
 import subprocess
 import sys
@@ -14,8 +15,14 @@ from pathlib import Path
 from typing import Any
 
 import httpx2
+from starlette.testclient import TestClient
 
-__all__ = ["Running", "running", "wait_until"]
+from wayfuse.service.app import create_app
+from wayfuse.service.server import Server, SiteFiles
+from wayfuse.service.settings import Settings
+from wayfuse.storage.log import last_seq
+
+__all__ = ["App", "Running", "running", "started", "wait_until"]
 
 _START_S = 60.0
 
@@ -110,3 +117,45 @@ def _is_up(client: httpx2.Client) -> bool:
         return client.get("/health").status_code == 200
     except httpx2.TransportError:
         return False
+
+
+class App:
+    """A server in this process, and clients of it with each scope's token."""
+
+    def __init__(self, server: Server, client: TestClient) -> None:
+        self.server, self.client = server, client
+        self.tokens = {
+            scope: server.tokens.create({scope}, server.clock(), label=scope)[0]
+            for scope in ("ingest", "read", "survey", "admin")
+        }
+
+    def headers(self, scope: str) -> dict[str, str]:
+        """The header of a scope's token."""
+        return {"Authorization": f"Bearer {self.tokens[scope]}"}
+
+    def get(self, path: str, scope: str = "read", **more: Any) -> Any:
+        """Answer of a GET."""
+        return self.client.get(path, headers=self.headers(scope), **more)
+
+    def post(self, path: str, body: Any, scope: str = "ingest", **more: Any) -> Any:
+        """Answer of a POST of bytes or JSON."""
+        content = {"content": body} if isinstance(body, bytes) else {"json": body}
+        return self.client.post(
+            path, headers=self.headers(scope) | more.pop("headers", {}), **content, **more
+        )
+
+    def settle(self) -> None:
+        """Wait until everything accepted is in the tracks."""
+        pipeline = self.server.pipeline
+        assert pipeline is not None
+        wait_until(lambda: pipeline.applied == last_seq(self.server.engine))
+
+
+@contextmanager
+def started(world: Any, data: Path, **settings: Any) -> Iterator[App]:
+    """A server of the small world in this process."""
+    values = {"particles": 100, "rate_per_s": 0.0} | settings
+    files = SiteFiles(world.folder / "SITE", world.folder / "map.npz")
+    server = Server(Settings(data=str(data), **values), [files], clock=time.time, random=secrets.token_bytes)
+    with TestClient(create_app(server), raise_server_exceptions=False) as client:
+        yield App(server, client)

@@ -11,6 +11,7 @@ from typing import Any
 
 import msgspec
 import pytest
+from service_running import started
 
 from wayfuse.service.export import CSV_COLUMNS
 from wayfuse.service.replay import envelopes
@@ -381,8 +382,6 @@ def test_a_forgotten_phone_is_nowhere(app: Any, world: Any) -> None:
 
 
 def test_too_many_requests_of_a_token_are_slowed_down(world: Any, tmp_path: Path) -> None:
-    from conftest import started
-
     with started(world, tmp_path, rate_per_s=0.01, rate_burst=3) as app:
         answers = [app.get("/api/v1/sites") for _ in range(5)]
         assert [a.status_code for a in answers] == [200, 200, 200, 429, 429]
