@@ -31,6 +31,8 @@ __all__ = [
 ]
 
 GRID_HZ = 100.0  # of the truth path
+_RATES, _LENGTHS = (1.6, 2.0), (0.5, 0.84)  # Hz and m, of adults who walk unhurried
+_BOUNCES = (0.5, 1.3)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -56,8 +58,14 @@ class WalkerModel:
 
     def __post_init__(self) -> None:
         no_negative(self)
-        moved = self.step_rate, self.step_length, self.up_rate, self.down_rate, self.leg_length
-        require("rates and lengths", min(moved) > 0.0, moved, "must be positive")
+        for key, value, (low, high) in (
+            ("step_rate", self.step_rate, _RATES),
+            ("step_length", self.step_length, _LENGTHS),
+            ("bounce_share", self.bounce_share, _BOUNCES),
+        ):
+            require(key, low <= value <= high, value, f"from {low:g} to {high:g}: what unhurried adults do")
+        others = self.up_rate, self.down_rate, self.leg_length
+        require("up_rate, down_rate, leg_length", min(others) > 0.0, others, "must be positive")
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,12 +121,12 @@ class Walk:
 
 
 def draw_person(model: WalkerModel, rng: np.random.Generator) -> Person:
-    """Draw a walker; rate and length stay within what adults do unhurried (1.6-2.0 Hz, 0.5-0.84 m)."""
+    """Draw a walker; rate and length stay within what adults do unhurried."""
     rate, length, bounce = rng.normal(0.0, 1.0, 3)
     return Person(
-        step_rate=float(np.clip(model.step_rate + model.step_rate_sigma * rate, 1.6, 2.0)),
-        step_length=float(np.clip(model.step_length + model.step_length_sigma * length, 0.5, 0.84)),
-        bounce=float(np.clip(model.bounce_share + model.bounce_sigma * bounce, 0.5, 1.3)),
+        step_rate=float(np.clip(model.step_rate + model.step_rate_sigma * rate, *_RATES)),
+        step_length=float(np.clip(model.step_length + model.step_length_sigma * length, *_LENGTHS)),
+        bounce=float(np.clip(model.bounce_share + model.bounce_sigma * bounce, *_BOUNCES)),
     )
 
 
