@@ -23,7 +23,8 @@ from wayfuse.models.motion.pdr import PdrMotion, StepInput
 from wayfuse.models.motion.random_walk import RandomWalk
 from wayfuse.models.observation.coverage import SurveyDistance
 from wayfuse.models.observation.fingerprint import FingerprintLikelihood
-from wayfuse.presets import baselines, fused
+from wayfuse.presets import baselines, catalogue, fused
+from wayfuse.presets.catalogue import PAPERS
 from wayfuse.presets.methods import build_method
 from wayfuse.radio.sparse_knn import SparseKnn
 from wayfuse.radio.survey import Fingerprint
@@ -48,13 +49,14 @@ OBSERVATIONS: dict[str, Callable[[Any], Any]] = {
     "mixture": lambda _: FingerprintLikelihood(),
     "with coverage": lambda world: FingerprintLikelihood(coverage=SurveyDistance.build(world.survey)),
 }
+WITHOUT_RANGES = tuple(name for name in PAPERS if "ranges" not in catalogue.METHODS[name].hears)
 METHODS: dict[str, Callable[[Any], Any]] = {
     "fused": lambda w: fused.build(w.site, w.survey, FEW),
     "fused, lag": lambda w: fused.build(w.site, w.survey, FEW, lag=3.0),
     "barriers": lambda w: fused.build(w.site, w.survey, replace(FEW, map_constraint="barriers")),
     **{
         name: (lambda w, n=name: build_method(n, w.site, w.survey, n_particles=N))
-        for name in ("fused-no-map", "fused-no-steps", "fused-2.4ghz", "fused-5ghz")
+        for name in ("fused-no-map", "fused-no-steps", "fused-2.4ghz", "fused-5ghz", *WITHOUT_RANGES)
     },
     **{
         scheme: (lambda w, s=scheme: fused.build(w.site, w.survey, replace(FEW, resampling=s)))
