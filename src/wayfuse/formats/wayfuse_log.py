@@ -11,7 +11,7 @@ import json
 from collections.abc import Callable, Mapping
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -29,6 +29,7 @@ _NOT_FINITE = {None: float("nan"), "inf": float("inf"), "-inf": float("-inf")}
 _DIGEST = 1 << 63
 _LARGEST = 1 << 64
 _CSI_AXES = 3
+_Rows: TypeAlias = dict[str, list[tuple[float, ...]]]
 
 
 def read(path: str | Path) -> Recording:
@@ -42,25 +43,7 @@ def read(path: str | Path) -> Recording:
     report = ReadReport(path=str(path))
     lines = path.read_text(encoding="utf-8", errors="replace").split("\n")
     head = _head(lines[0], path)
-    rows: dict[str, list[tuple[float, ...]]] = {kind: [] for kind in _WIDTHS}
-    events: dict[str, list[Any]] = {kind: [] for kind in _EVENTS}
-    for number, line in enumerate(lines[1:], start=2):
-        if not line.strip():
-            continue
-        report.n_lines = number
-        try:
-            kind, *fields = json.loads(line)
-            if kind in _WIDTHS:
-                rows[kind].append(_sample(fields, _WIDTHS[kind]))
-            elif kind in _EVENTS:
-                events[kind].append(_MAKERS[kind](fields))
-            else:
-                report.add("a record of an unknown kind", number)
-                continue
-        except (ValueError, TypeError, OverflowError):
-            report.add("not a record", number)
-            continue
-        report.n_records[kind] = report.n_records.get(kind, 0) + 1
+    rows, events = _records(lines[1:], report)
     series = {kind: _series(kind, rows[kind], report) for kind in _WIDTHS}
     recording = Recording(
         name=_text(head, "name") or path.stem,
@@ -84,6 +67,30 @@ def read(path: str | Path) -> Recording:
     if recording.is_empty:
         report.add("no record in the recording", report.n_lines)
     return recording
+
+
+def _records(lines: list[str], report: ReadReport) -> tuple[_Rows, dict[str, list[Any]]]:
+    """Samples and events by kind, of the lines after the first."""
+    rows: _Rows = {kind: [] for kind in _WIDTHS}
+    events: dict[str, list[Any]] = {kind: [] for kind in _EVENTS}
+    for number, line in enumerate(lines, start=2):
+        if not line.strip():
+            continue
+        report.n_lines = number
+        try:
+            kind, *fields = json.loads(line)
+            if kind in _WIDTHS:
+                rows[kind].append(_sample(fields, _WIDTHS[kind]))
+            elif kind in _EVENTS:
+                events[kind].append(_MAKERS[kind](fields))
+            else:
+                report.add("a record of an unknown kind", number)
+                continue
+        except (ValueError, TypeError, OverflowError):
+            report.add("not a record", number)
+            continue
+        report.n_records[kind] = report.n_records.get(kind, 0) + 1
+    return rows, events
 
 
 def _head(line: str, path: Path) -> Mapping[str, Any]:
