@@ -41,8 +41,11 @@ def tick(
     scans: Array32,
     places: Array32,
     out: Array,
-) -> None:
+) -> int:
     """Advance some tracks of a batch by one step and one observation each, in place.
+
+    Returns -1, or the first k that names a track outside the batch, one already named, or a step that is not finite;
+    nothing is changed then.
 
     particles (U, 4, N), log_weights (U, N), counters (U, 3): key, key, draws so far. tracks (K,): the rows to advance.
     steps (K, 2): length m, heading rad; a length of 0 or less = no step. numbers (7,): the four sigmas of `pdr_move`,
@@ -52,6 +55,9 @@ def tick(
     `add_places`; an axis of length 0 = there are none. out (K, 8): mean x, y, covariance xx, xy, yy, effective sample
     size, log of the mean weight, and 1 where it resampled.
     """
+    wrong = _first_wrong(tracks, steps, len(counters))
+    if wrong >= 0:
+        return wrong
     n = particles.shape[2]
     words, z, block = np.empty((4, n), np.uint32), np.empty((4, n), np.float32), np.empty((4, n), np.float32)
     weights, hit, marks = np.empty(n, np.float32), np.empty(n, np.bool_), np.empty(n + 1, np.int32)
@@ -88,6 +94,21 @@ def tick(
             out[k, 7] = 1.0
         else:
             _copy(block, old)
+    return -1
+
+
+@kernel
+def _first_wrong(tracks: NDArray[np.int64], steps: Array32, n_tracks: int) -> int:
+    named = np.zeros(n_tracks if len(tracks) > 1 else 1, np.bool_)
+    for k in range(len(tracks)):
+        u = tracks[k]
+        if u < 0 or u >= n_tracks or not (np.isfinite(steps[k, 0]) and np.isfinite(steps[k, 1])):
+            return k
+        if len(tracks) > 1:
+            if named[u]:
+                return k
+            named[u] = True
+    return -1
 
 
 @kernel

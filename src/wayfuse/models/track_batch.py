@@ -98,21 +98,23 @@ class BatchModel:
         rows = np.ascontiguousarray(tracks, dtype=np.int64)
         moves = np.ascontiguousarray(steps, dtype=np.float32)
         n, seen = len(rows), seen or Seen()
-        if moves.shape != (n, 2) or not np.isfinite(moves).all():
-            raise UsageError(f"steps of shape {moves.shape}", remedy=f"({n}, 2) finite numbers")
-        if n and (
-            rows.min() < 0 or rows.max() >= len(batch.counters) or (n > 1 and len(np.unique(rows)) < n)
-        ):
-            raise UsageError("tracks", remedy=f"rows below {len(batch.counters)}, each once")
+        if moves.shape != (n, 2):
+            raise UsageError(f"steps of shape {moves.shape}", remedy=f"({n}, 2): m, rad")
         numbers, walls, anchors = self.tables
         out = np.empty((n, 8))
-        tick(
+        wrong = tick(
             batch.particles, batch.log_weights, batch.counters, rows, moves, numbers, *walls, anchors,
             _NO_RANGES if seen.ranges is None else _of_tracks(seen.ranges, (n, len(anchors)), "ranges"),
             self.levels.levels, self.levels.frame,
             _NO_SCANS if seen.scans is None else self.levels.scans(_of_tracks(seen.scans, (n, None), "scans")),
             _NO_PLACES if seen.places is None else _finite(_of_tracks(seen.places, (n, None, 4), "places")), out,
         )  # fmt: skip
+        if wrong >= 0:
+            raise UsageError(
+                f"track {rows[wrong]} with step {moves[wrong].tolist()}",
+                where=f"tracks[{wrong}]",
+                remedy=f"rows below {len(batch.counters)}, each once, and finite steps",
+            )
         return out
 
 
