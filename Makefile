@@ -4,16 +4,25 @@ PYTHON ?= python3
 UV_VERSION := 0.13.9
 VENV := .venv
 STAMP := $(VENV)/.wayfuse-setup
+WEB := src/wayfuse/service/web
+PAGE := $(WEB)/assets/lock.sha256.txt
 
-.PHONY: setup demo test test-fast check lint types imports cov results bench clean
+.PHONY: setup web demo test test-fast check lint types imports cov results bench clean
 
-setup: $(STAMP)
+setup: $(STAMP) $(PAGE)
 
 $(STAMP): pyproject.toml uv.lock
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { echo "wayfuse needs python3 >= 3.11 ($(PYTHON) is older): set PYTHON=/path/to/python3.11"; exit 2; }
 	$(PYTHON) -m venv --clear $(VENV)
 	$(VENV)/bin/python -m pip install --quiet --disable-pip-version-check uv==$(UV_VERSION)
 	UV_PROJECT_ENVIRONMENT=$(VENV) $(VENV)/bin/uv sync --locked --inexact --quiet --python $(VENV)/bin/python
+	@touch $@
+
+# what the page of `wayfuse serve` loads besides its own files: the map library, from npm, as locked
+web: $(PAGE)
+
+$(PAGE): $(WEB)/package-lock.json $(WEB)/build.py | $(STAMP)
+	$(VENV)/bin/python -m wayfuse.service.web.build
 	@touch $@
 
 demo: setup
@@ -47,4 +56,4 @@ results: setup
 	$(VENV)/bin/wayfuse results --out docs/results.md
 
 clean:
-	rm -rf $(VENV) demo-out .mypy_cache .ruff_cache .pytest_cache .hypothesis
+	rm -rf $(VENV) $(WEB)/assets demo-out .mypy_cache .ruff_cache .pytest_cache .hypothesis

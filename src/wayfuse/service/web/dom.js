@@ -35,6 +35,13 @@ export function duration(seconds) {
   return `${Math.floor(s / 3600)} h ${Math.floor((s % 3600) / 60)} min`;
 }
 
+/** The same in one number. */
+export function age(seconds) {
+  if (seconds < 2) return "now";
+  const [size, unit] = [[86_400, "d"], [3600, "h"], [60, "min"], [1, "s"]].find(([size]) => seconds >= size);
+  return `${Math.floor(seconds / size)} ${unit}`;
+}
+
 /** A control that runs `work` when pressed, is busy meanwhile, and says what went wrong. */
 export function action(text, work, props = {}) {
   const said = el("span", { role: "status", className: "said" });

@@ -90,12 +90,14 @@ function trail({ p, trail: places }) {
   return long.length ? [feature({ type: "MultiLineString", coordinates: long }, said)] : [];
 }
 
-/** A plan with words on its landings. */
+/** A plan with words on its landings, unless a unit says the same already. */
 function labelled(plan) {
+  const said = new Set(plan.features.filter((f) => f.properties.kind === "unit").map((f) => f.properties.name));
   const features = plan.features.map((f) => {
     if (f.properties.kind !== "landing") return f;
     const { name, category } = f.properties;
-    return { ...f, properties: { ...f.properties, label: name || NAMES[category] || category } };
+    const label = name || NAMES[category] || category;
+    return { ...f, properties: { ...f.properties, label: said.has(label) ? "" : label } };
   });
   return collection(features);
 }

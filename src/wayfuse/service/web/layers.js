@@ -28,6 +28,16 @@ const LAYERS = [
     paint: (p) => ({ "line-color": p.door, "line-width": zoomed(17, 1.2, 20, 3, 23, 8) }),
   },
   { id: "edge", type: "line", source: "plan", filter: kind("outline"), paint: (p) => ({ "line-color": p.edge, "line-width": zoomed(15, 1, 20, 2) }) },
+  {
+    id: "landings", type: "symbol", source: "plan", filter: kind("landing"), minzoom: 17,
+    layout: { "text-field": ["get", "label"], "text-font": FONT, "text-size": 11, "text-padding": 1, "text-max-width": 6 },
+    paint: (p) => ({ "text-color": p.landing, "text-halo-color": p.halo, "text-halo-width": 1.5 }),
+  },
+  {
+    id: "unit-names", type: "symbol", source: "plan", filter: kind("unit"), minzoom: 17.5,
+    layout: { "text-field": ["get", "name"], "text-font": FONT, "text-size": zoomed(17.5, 10, 21, 14), "text-max-width": 8, "text-padding": 4 },
+    paint: (p) => ({ "text-color": p.text, "text-halo-color": p.halo, "text-halo-width": 1.5, "text-opacity": 0.85 }),
+  },
   { id: "radii-95", type: "fill", source: "radii", filter: ["==", ["get", "share"], 95], paint: () => ({ "fill-color": ["get", "colour"], "fill-opacity": 0.1 }) },
   { id: "radii-68", type: "fill", source: "radii", filter: ["==", ["get", "share"], 68], paint: () => ({ "fill-color": ["get", "colour"], "fill-opacity": 0.16 }) },
   {
@@ -60,16 +70,6 @@ const LAYERS = [
       "circle-stroke-width": ["match", ["get", "state"], "tracking", 2.5, 3.5],
       "circle-stroke-opacity": ["case", ["get", "quiet"], 0.6, 1],
     }),
-  },
-  {
-    id: "landings", type: "symbol", source: "plan", filter: kind("landing"), minzoom: 17,
-    layout: { "text-field": ["get", "label"], "text-font": FONT, "text-size": 11, "text-padding": 1 },
-    paint: (p) => ({ "text-color": p.landing, "text-halo-color": p.halo, "text-halo-width": 1.5 }),
-  },
-  {
-    id: "unit-names", type: "symbol", source: "plan", filter: kind("unit"), minzoom: 17.5,
-    layout: { "text-field": ["get", "name"], "text-font": FONT, "text-size": zoomed(17.5, 10, 21, 14), "text-max-width": 8, "text-padding": 4 },
-    paint: (p) => ({ "text-color": p.text, "text-halo-color": p.halo, "text-halo-width": 1.5, "text-opacity": 0.85 }),
   },
   {
     id: "next-names", type: "symbol", source: "next",

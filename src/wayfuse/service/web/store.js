@@ -6,6 +6,9 @@ import { Frame } from "/web/frames.js";
 const TRAIL = 240; // places kept of each track
 const QUIET_S = 30; // without a word a track is drawn pale
 
+const hasPlace = (p) => p.x !== null && p.state !== "initialising";
+const placeIn = ({ n, t, floor, x, y }) => ({ n, t, floor, x, y });
+
 class Store extends EventTarget {
   site = "";
   floors = []; // { floor, level, frame, is_on_earth }
@@ -66,6 +69,18 @@ class Store extends EventTarget {
     }
     const at = this.tracks.get(track);
     if (at && follow) this.showFloor(at.p.floor);
+    if (at) this.#recall(track);
+  }
+
+  /** Where a track was before this page was opened. */
+  async #recall(track) {
+    const { features } = await get(`/api/v1/tracks/${track}/estimates`, { limit: TRAIL }).catch(() => ({ features: [] }));
+    const at = this.tracks.get(track);
+    if (!at || !features.length) return;
+    const known = at.trail.filter((place) => place.n > features.at(-1).properties.n);
+    const before = features.map((f) => f.properties).filter(hasPlace).map(placeIn);
+    this.tracks.set(track, { ...at, trail: [...before, ...known].slice(-TRAIL) });
+    this.tell("tracks");
   }
 
   /** Take an event of the stream. */
@@ -82,7 +97,7 @@ class Store extends EventTarget {
   #place(p, changed) {
     const known = this.tracks.get(p.track) ?? { trail: [] };
     const trail = known.trail.filter((at) => at.n < Math.min(changed, p.n));
-    if (p.x !== null && p.state !== "initialising") trail.push({ n: p.n, t: p.t, floor: p.floor, x: p.x, y: p.y });
+    if (hasPlace(p)) trail.push(placeIn(p));
     this.tracks.set(p.track, { p, trail: trail.slice(-TRAIL) });
     if (p.track === this.selected && this.following) this.showFloor(p.floor);
   }

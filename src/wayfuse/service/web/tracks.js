@@ -2,7 +2,7 @@
 
 import { get } from "/web/api.js";
 import { placeOf } from "/web/draw.js";
-import { duration, el, metres, percent } from "/web/dom.js";
+import { age, duration, el, metres, percent } from "/web/dom.js";
 import { collection, feature } from "/web/frames.js";
 import { short, store } from "/web/store.js";
 import { onTheme, trackColour } from "/web/theme.js";
@@ -52,13 +52,12 @@ function makeRow(track) {
 }
 
 function fillRow({ button, parts }, p) {
-  const age = store.now - p.heard;
   parts.mark.style.setProperty("--colour", trackColour(p.track));
   parts.name.textContent = short(p.track);
   parts.level.textContent = p.x === null ? "–" : p.level;
   parts.state.textContent = p.is_ended ? "ended" : p.state;
   parts.radius.textContent = `± ${metres(p.radius_m_95, 0)}`;
-  parts.age.textContent = age < 2 ? "now" : duration(age);
+  parts.age.textContent = age(store.now - p.heard);
   Object.assign(button.dataset, { track: p.track, state: p.state, level: p.level, n: p.n });
   button.classList.toggle("quiet", store.isQuiet(p));
   button.setAttribute("aria-pressed", String(p.track === store.selected));
@@ -93,9 +92,9 @@ function startDetail(map, replay) {
     facts.replaceChildren(...pairs({
       Place: p.x === null ? "–" : `x ${metres(p.x)}, y ${metres(p.y)}`,
       "Within, 68 / 95 %": `${metres(p.radius_m_68)} / ${metres(p.radius_m_95)}`,
-      "Steps since the estimate before": p.why.steps,
+      "Steps since the last one": p.why.steps,
       "Access points heard": p.why.access_points,
-      "Particles stopped by walls": percent(p.why.share_blocked),
+      "Stopped by walls": percent(p.why.share_blocked),
       "Effective particles": percent(p.why.effective_particles),
       "Last heard": `${duration(store.now - p.heard)} ago`,
     }));

@@ -1,0 +1,179 @@
+"""The page in a real browser: a phone walks, the dot moves, the floor changes."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+pytestmark = pytest.mark.slow  # a browser that draws without a GPU takes seconds to start and to draw
+
+
+def _near(dot: tuple[float, float, str], lonlat: list[float]) -> bool:
+    """Within about 5 cm: what is drawn is cut into tiles."""
+    return abs(dot[0] - lonlat[0]) < 6e-7 and abs(dot[1] - lonlat[1]) < 6e-7
+
+
+def _place(server: Any, track: str) -> Any:
+    with server.client() as client:
+        return client.get(f"/api/v1/tracks/{track}/position").json()
+
+
+def test_a_phone_walks_the_dot_moves_and_the_floor_changes(
+    look: Callable[..., Any], new_phone: Callable[[str], Any], served: Any
+) -> None:
+    phone = new_phone("walker")
+    phone.walk(6)
+    page = look()
+    page.enter(served.token)
+    page.page.click(f"[data-track='{phone.track}']")
+    levels, places = [], []
+    while True:
+        feature = _place(served, phone.track)
+        p, lonlat = feature["properties"], feature["geometry"]["coordinates"]
+        page.until(lambda p=p: page.level == p["level"])
+        page.until(lambda at=lonlat: _near(page.dots().get(phone.track, (0.0, 0.0, "")), at))
+        assert page.dots()[phone.track][2] == p["state"]
+        levels.append(p["level"])
+        places.append(tuple(lonlat))
+        if phone.is_done:
+            break
+        phone.walk(8)
+    assert len(set(levels)) > 1
+    assert len(set(places)) == len(places)
+    said = page.page.inner_text(".detail .state")
+    assert said == f"{phone.track[:6]}: ended, was {p['state']} on level {p['level']}"
+
+
+def test_radii_trail_and_particles_of_the_chosen_track_are_drawn(
+    look: Callable[..., Any], new_phone: Callable[[str], Any], served: Any
+) -> None:
+    phone = new_phone("cloud")
+    phone.walk(10)
+    page = look()
+    page.enter(served.token)
+    page.page.click(f"[data-track='{phone.track}']")
+    page.page.check("#show-particles")
+
+    def drawn(layer: str) -> int:
+        count = (
+            "(layer) => document.querySelector('#map').map.queryRenderedFeatures({layers: [layer]}).length"
+        )
+        return int(page.page.evaluate(count, layer))
+
+    for layer in ("radii-95", "radii-68", "trails", "outline", "units", "walls", "unit-names"):
+        page.until(lambda layer=layer: drawn(layer) > 0)
+    page.until(lambda: drawn("particles") > 20)
+    page.page.uncheck("#show-particles")
+    page.until(lambda: drawn("particles") == 0)
+    facts = page.page.inner_text(".detail .facts")
+    assert "Access points heard" in facts
+    page.page.click("text=Counters of its input")
+    page.until(lambda: "messages" in page.page.inner_text(".detail details"))
+
+
+def test_a_past_track_is_replayed(
+    look: Callable[..., Any], new_phone: Callable[[str], Any], served: Any
+) -> None:
+    phone = new_phone("past")
+    phone.walk(30)
+    page = look()
+    page.enter(served.token)
+    page.page.click("#tab-replay")
+    page.until(lambda: page.page.locator(f"#replay-track option[value='{phone.track}']").count())
+    page.page.select_option("#replay-track", phone.track)
+    page.page.wait_for_selector("#replay-time")
+    seen = []
+    for t in ("5", "25"):
+        page.page.fill("#replay-time", t)
+        page.until(lambda: phone.track in page.dots())
+        page.page.wait_for_timeout(300)
+        seen.append(page.dots()[phone.track])
+    assert seen[0] != seen[1]
+    page.page.fill("#replay-time", "0")
+    page.page.get_by_role("button", name="Play", exact=True).click()
+    page.until(lambda: float(page.page.input_value("#replay-time")) > 0.5)
+    page.page.click("text=Pause")
+    page.page.click("text=Back to live")
+    assert not page.page.is_visible("#replay-time")
+
+
+def test_floors_and_tabs_are_operated_from_the_keyboard(look: Callable[..., Any], served: Any) -> None:
+    page = look()
+    page.enter(served.token)
+    page.page.focus("#floors [aria-checked=true]")
+    before = page.level
+    page.page.keyboard.press("ArrowUp")
+    assert page.level != before
+    assert page.page.evaluate("() => document.activeElement.getAttribute('aria-checked')") == "true"
+    page.page.focus("#tab-tracks")
+    page.page.keyboard.press("ArrowRight")
+    assert page.page.is_visible("#view-replay")
+    assert not page.page.is_visible("#view-tracks")
+    page.page.keyboard.press("End")
+    assert page.page.is_visible("#view-survey")
+
+
+def test_the_token_stays_in_the_tab_and_a_wrong_one_is_refused(look: Callable[..., Any], served: Any) -> None:
+    page = look()
+    page.page.goto(f"{served.address}/")
+    page.page.fill("#token", "wf_0_0")
+    page.page.click("text=Show the map")
+    page.until(lambda: "no valid token" in page.page.inner_text("#login-said"))
+    assert any("401" in said for said in page.complaints)  # the browser's own word for it
+    page.complaints.clear()
+    page.page.fill("#token", served.token)
+    page.page.click("text=Show the map")
+    page.page.wait_for_selector("#floors button")
+    kept = page.page.evaluate("() => [JSON.stringify(localStorage), document.cookie, location.href].join()")
+    assert served.token not in kept
+    assert json.loads(page.page.evaluate("() => JSON.stringify(sessionStorage)")) == {
+        "wayfuse-token": served.token
+    }
+    page.page.reload()
+    page.page.wait_for_selector("#floors button")
+    page.page.click("#leave")
+    page.page.wait_for_selector("#login[open]")
+    assert page.page.evaluate("() => sessionStorage.length") == 0
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_light_and_dark_follow_the_system_and_the_button(
+    look: Callable[..., Any], served: Any, scheme: str
+) -> None:
+    page = look(color_scheme=scheme)
+    page.enter(served.token)
+
+    def ground() -> str:
+        paint = "() => document.querySelector('#map').map.getPaintProperty('ground', 'background-color')"
+        return str(page.page.evaluate(paint))
+
+    first = ground()
+    assert page.page.evaluate("() => document.documentElement.dataset.theme") == scheme
+    page.page.click("#theme")  # light
+    page.page.click("#theme")  # dark
+    assert page.page.inner_text("#theme") == "Theme: dark"
+    assert (ground() == first) == (scheme == "dark")
+
+
+def test_a_phones_screen_has_room_for_all_of_it(look: Callable[..., Any], served: Any) -> None:
+    page = look(viewport={"width": 360, "height": 740}, has_touch=True)
+    page.enter(served.token)
+    wide = "() => document.documentElement.scrollWidth <= document.documentElement.clientWidth"
+    for tab in ("#tab-tracks", "#tab-replay", "#tab-survey"):
+        page.page.click(tab)
+        assert page.page.evaluate(wide)
+        box = page.page.locator(tab).bounding_box()
+        assert box["height"] >= 40
+    assert page.page.locator("#map").bounding_box()["height"] > 250
+
+
+def test_without_the_map_library_the_page_says_how_to_build_it(look: Callable[..., Any], served: Any) -> None:
+    page = look()
+    page.page.route("**/web/assets/*", lambda route: route.fulfill(status=404, body="{}"))
+    page.page.goto(f"{served.address}/")
+    page.until(lambda: "make web" in page.page.inner_text("#notice"))
+    assert all("404" in said for said in page.complaints)
+    page.complaints.clear()
