@@ -1,0 +1,46 @@
+"""docs/server.md says what the server has: every setting, scope, way in, and route."""
+
+from __future__ import annotations
+
+import dataclasses
+import re
+from pathlib import Path
+
+import pytest
+
+from wayfuse.service.adapters import ADAPTERS
+from wayfuse.service.routes import admin, inputs, outputs, pages, stream
+from wayfuse.service.settings import Settings
+from wayfuse.storage.tokens import SCOPES
+
+PAGE = (Path(__file__).resolve().parents[2] / "docs" / "server.md").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("field", dataclasses.fields(Settings), ids=lambda f: f.name)
+def test_every_setting_is_documented_with_its_default(field: dataclasses.Field[object]) -> None:
+    default = repr(field.default).replace("'", '"')
+    assert f"| `{field.name}` | `{default}` | " in PAGE
+
+
+def test_the_page_documents_no_setting_that_is_not_there() -> None:
+    table = PAGE[PAGE.index("## Settings") :]
+    names = re.findall(r"^\| `(\w+)` \|", table, re.MULTILINE)
+    assert names == [f.name for f in dataclasses.fields(Settings)]
+
+
+@pytest.mark.parametrize("scope", SCOPES)
+def test_every_scope_is_documented(scope: str) -> None:
+    assert f"| `{scope}` | " in PAGE
+
+
+@pytest.mark.parametrize("adapter", ADAPTERS)
+def test_every_way_in_is_documented(adapter: str) -> None:
+    assert re.search(rf"/in/(TOKEN/)?{adapter}", PAGE) or adapter == "find3"
+
+
+def test_routes_of_the_page_exist() -> None:
+    known = {route.path for part in (admin, inputs, outputs, pages, stream) for route in part.router.routes}
+    patterns = [re.compile(re.sub(r"\{\w+\}", "[^/]+", path)) for path in known]
+    named = set(re.findall(r"/(?:api/v1|in)/[\w/-]+\w", PAGE)) | {"/metrics"}
+    for path in named - {"/in/TOKEN"}:
+        assert any(p.fullmatch(path) for p in patterns), path
