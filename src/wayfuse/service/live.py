@@ -10,6 +10,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
+from sqlalchemy.exc import SQLAlchemyError
+
 from wayfuse.core.errors import FormatError
 from wayfuse.service.adapters import ADAPTERS
 from wayfuse.service.checkpoint import pack, unpack
@@ -92,7 +94,12 @@ class Live:
         self._lock = threading.RLock()
 
     def apply(self, entry: Entry, message: Message | None = None) -> Applied | None:
-        """Take an entry; None where it changed nothing. ``message`` : what the entry says, where it is at hand."""
+        """Take an entry; None where it changed nothing. ``message`` : what the entry says, where it is at hand.
+
+        Raises
+        ------
+        SQLAlchemyError : the track's checkpoint cannot be read now; nothing has changed, try again.
+        """
         if entry.site not in self._worlds or entry.adapter not in ADAPTERS:
             self.counts["entries of no site or adapter"] += (
                 1  # of a site that is no longer served, or deleted
@@ -105,14 +112,15 @@ class Live:
             _log.warning("entry %d of the log: %s", entry.seq, error)
             return None
         with self._lock:
-            held = self._of(entry)
-            held.row = held.row._replace(heard=entry.arrived)
-            held.is_dirty = True
             try:
+                held = self._of(entry)
+                held.row = held.row._replace(heard=entry.arrived)
+                held.is_dirty = True
                 changed = held.track.apply(message, entry.arrived)
+            except SQLAlchemyError:
+                raise  # the checkpoint cannot be read now: the entry is not at fault
             except Exception:  # whatever it is, it must not stop the other tracks
                 self.counts["entries that failed"] += 1
-                held.track.counts["messages that failed"] += 1
                 _log.exception("entry %d of the log failed", entry.seq)
                 return None
             return Applied(entry.seq, self._view(held), changed)

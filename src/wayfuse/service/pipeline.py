@@ -44,13 +44,18 @@ class Item(NamedTuple):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PipelineConfig:
-    """max_waiting, max_waiting_bytes : what may wait to be written. group : most entries of one transaction.
-    checkpoint_every : s between checkpoints. idle : s until a silent track leaves the memory."""
+    """Limits and periods.
+
+    max_waiting, max_waiting_bytes : what may wait to be written. group : most entries of one transaction.
+    checkpoint_every : s between checkpoints. retry_every : s until a database that was away is asked again.
+    idle : s until a silent track leaves the memory.
+    """
 
     max_waiting: int = 10_000
     max_waiting_bytes: int = 256 << 20
     group: int = 512
     checkpoint_every: float = 10.0
+    retry_every: float = 1.0
     idle: float = 900.0
 
     def __post_init__(self) -> None:
@@ -216,11 +221,23 @@ class Pipeline:
             first += len(waiting.items)
         changes = []
         for item in numbered:
-            applied = self._live.apply(item.entry, item.message)
+            applied = self._apply(item)
             if applied is not None:
                 changes.append(applied)
             self.applied = item.entry.seq
         self._publish(changes, self.applied)
+
+    def _apply(self, item: Item) -> Applied | None:
+        """Apply an entry; it is in the log, so wait for a database that is away rather than leave it out."""
+        while True:
+            try:
+                return self._live.apply(item.entry, item.message)
+            except SQLAlchemyError as error:
+                _log.error("a checkpoint cannot be read: %s", type(error).__name__)
+                with self._wake:
+                    if self._stopping:
+                        raise
+                    self._wake.wait(self._config.retry_every)
 
     def drop(self, tracks: Collection[str]) -> None:
         """Leave tracks out of what is still to be written; to be used in `call` alone."""

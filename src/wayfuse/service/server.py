@@ -13,8 +13,9 @@ from typing import NamedTuple
 
 import msgspec
 
-from wayfuse.core.errors import RadioMapError, UsageError
+from wayfuse.core.errors import ConfigError, RadioMapError, UsageError
 from wayfuse.maps.site import Site
+from wayfuse.presets.methods import CONFIGS, FIXES
 from wayfuse.radio.walk_survey import load
 from wayfuse.service.events import Event, Hub
 from wayfuse.service.identity import Pseudonyms, load_key
@@ -67,6 +68,12 @@ class Server:
         clock: Callable[[], float],
         random: Callable[[int], bytes],
     ) -> None:
+        if settings.method not in {*CONFIGS, *FIXES}:
+            raise ConfigError(
+                f"no method {settings.method!r}",
+                where="method",
+                remedy=f"use one of {', '.join([*CONFIGS, *FIXES])}",
+            )
         self.settings, self.clock = settings, clock
         data = Path(settings.data)
         data.mkdir(mode=0o700, parents=True, exist_ok=True)
@@ -99,12 +106,16 @@ class Server:
             version = self.add_radio_map(site, archive, _OPERATOR, files.radio_map.name)
             if self.published(site.name) != version:
                 self.publish(site.name, version, _OPERATOR)
-        return World(
+        world = World(
             site,
             lambda version: self.sites.archive(site.name, version),
             method=self.settings.method,
             n_particles=self.settings.particles,
         )
+        version_in_use = self.published(site.name)
+        if version_in_use is not None:
+            world.tracker(version_in_use)  # now, not when the first phone waits
+        return world
 
     def add_radio_map(self, site: Site, archive: bytes, actor: str, note: str) -> int:
         """Check and keep a radio map; its version.
