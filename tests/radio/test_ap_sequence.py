@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Literal
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -138,3 +140,24 @@ def test_wrong_use_says_so() -> None:
         nearest(SQUARE, np.ones(4), 0)
     with pytest.raises(UsageError, match="one value per access point"):
         from_positions(SQUARE, EXTENT, 1.0).similarity(np.zeros(3))
+
+
+def counted_in_numpy(first: Array, second: Array, tau: str) -> Array:
+    """The twin of the kernel: signs of all pairs, one product."""
+    i, j = np.triu_indices(len(first), 1)
+    one, many = np.sign(first[i] - first[j]), np.sign(second[:, i] - second[:, j])
+    apart, tied = many @ one, np.sqrt((one**2).sum() * (many**2).sum(axis=1))
+    divisor = np.full(len(second), 0.5 * len(first) * (len(first) - 1)) if tau == "a" else tied
+    return np.divide(apart, divisor, out=np.zeros(len(second)), where=divisor > 0.0)
+
+
+@pytest.mark.parametrize("tau", ["a", "b"])
+@pytest.mark.parametrize(
+    "n", [2, 11, 12, 30, 100]
+)  # 1, 55, 66, 435 and 4950 pairs: words partly and wholly used
+def test_the_kernel_is_its_twin_to_the_bit(n: int, tau: Literal["a", "b"]) -> None:
+    rng = np.random.default_rng(n)
+    first, second = rng.integers(0, n, n).astype(np.float64), rng.integers(0, n, (70, n)).astype(np.float64)
+    second[0] = first
+    second[1] = 1.0  # all tied
+    np.testing.assert_array_equal(kendall_tau(first, second, tau), counted_in_numpy(first, second, tau))

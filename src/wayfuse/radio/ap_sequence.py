@@ -35,7 +35,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wayfuse.core.errors import ConfigError, UsageError
-from wayfuse.core.types import Array, IntArray
+from wayfuse.core.types import Array
+from wayfuse.radio._rank_kernels import tau_of_places
 
 __all__ = [
     "Neighbours",
@@ -56,15 +57,11 @@ _NEVER = -np.inf  # dBm that stands for "not heard": weaker than any reading, eq
 
 
 class _Orders(NamedTuple):
-    """Bits of the pairs of each sequence, (m, words): first before second, second before first."""
+    """Bits of the pairs of each sequence, (words, m): first before second, second before first; (m,) not tied."""
 
     ahead: NDArray[np.uint64]
     behind: NDArray[np.uint64]
-
-    @property
-    def ordered(self) -> IntArray:
-        """(m,) pairs that are not tied."""
-        return _count(self.ahead) + _count(self.behind)
+    ordered: NDArray[np.int64]
 
 
 class Neighbours(NamedTuple):
@@ -92,7 +89,7 @@ def kendall_tau(first: NDArray[np.floating], second: NDArray[np.floating], tau: 
 
     ``tau="a"`` divides by all pairs, ``tau="b"`` is `scipy.stats.kendalltau`; 0 where a divisor is 0.
     """
-    return _tau(_orders(first[None]), _orders(second), second.shape[1], tau)
+    return _tau(first, _orders(second), tau)
 
 
 def grid_places(extent: tuple[float, float, float, float], size: float) -> Array:
@@ -120,8 +117,7 @@ class SequenceMap:
             raise UsageError(
                 f"a scan of shape {rssi.shape}", remedy=f"one value per access point ({self.n_aps})"
             )
-        scan = _orders(-_heard_first(rssi)[None])
-        return 0.5 * (1.0 + _tau(scan, self.orders, self.n_aps, self.tau))
+        return _tau(-rssi, self.orders, self.tau, 0.5, 0.5)
 
     def neighbours(self, rssi: NDArray[np.floating], k: int) -> Neighbours:
         """The k places most similar to a scan, weighted by their similarity."""
@@ -201,25 +197,22 @@ def _orders(keys: NDArray[np.floating]) -> _Orders:
     """Pair bits of m sequences of numbers (m, n), smallest first."""
     first, second = np.triu_indices(keys.shape[1], 1)
     a, b = keys[:, first], keys[:, second]
-    return _Orders(_pack(a < b), _pack(a > b))
+    return _Orders(_pack(a < b), _pack(a > b), np.asarray((a != b).sum(axis=1), np.int64))
 
 
 def _pack(bits: NDArray[np.bool_]) -> NDArray[np.uint64]:
     words = -(-bits.shape[1] // _WORD)
     padded = np.zeros((len(bits), words * _WORD), dtype=np.bool_)
     padded[:, : bits.shape[1]] = bits
-    return np.packbits(padded, axis=1).view(np.uint64)
+    packed = np.packbits(padded, axis=1, bitorder="little").view("<u8")
+    return np.ascontiguousarray(packed.T, dtype=np.uint64)
 
 
-def _count(words: NDArray[np.uint64]) -> IntArray:
-    return np.asarray(np.bitwise_count(words).sum(axis=1, dtype=np.int64))
-
-
-def _tau(one: _Orders, many: _Orders, n: int, tau: Tau) -> Array:
-    """Tau (m,) of one sequence (1, words) with m; 0 where the divisor is 0."""
-    concordant = _count(one.ahead & many.ahead) + _count(one.behind & many.behind)
-    discordant = _count(one.ahead & many.behind) + _count(one.behind & many.ahead)
-    pairs = np.full(len(concordant), 0.5 * n * (n - 1))  # Eq. 4 of [1]_
-    divisor = pairs if tau == "a" else np.sqrt(one.ordered * many.ordered)  # tau_b of [2]_
-    apart = (concordant - discordant).astype(np.float64)
-    return np.asarray(np.divide(apart, divisor, out=np.zeros_like(apart), where=divisor > 0.0))
+def _tau(
+    keys: NDArray[np.floating], many: _Orders, tau: Tau, scale: float = 1.0, shift: float = 0.0
+) -> Array:
+    """shift + scale tau (m,) of one sequence (n,), smallest first, with m: Eq. 4 of [1]_, tau-b of [2]_."""
+    out = np.empty(len(many.ordered))
+    one = np.ascontiguousarray(keys, dtype=np.float64)
+    tau_of_places(one, many.ahead, many.behind, many.ordered, tau == "b", scale, shift, out)
+    return out
