@@ -9,16 +9,25 @@ errors is kept. Not the median: bad fixes are the filter's background, the width
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from wayfuse.core.types import Array
 from wayfuse.radio.sparse_knn import SparseKnn, fix_of
 from wayfuse.radio.survey import Fingerprint, Survey
 
-__all__ = ["held_out_errors", "survey_accuracy"]
+__all__ = ["HeldOut", "held_out", "held_out_errors", "survey_accuracy"]
 
 _LEAST = 20  # held-out fixes below which nothing is said
+
+
+class HeldOut(NamedTuple):
+    """Fixes of a survey's own fingerprints by the walks they are not of: rows (k,) of the survey, errors (k,) m."""
+
+    rows: NDArray[np.int64]
+    errors: Array
 
 
 def survey_accuracy(survey: Survey, n: int = 300) -> float:
@@ -34,10 +43,16 @@ def survey_accuracy(survey: Survey, n: int = 300) -> float:
 
 def held_out_errors(survey: Survey, n: int = 300) -> Array:
     """Errors (m) of about n fingerprints, evenly spread, by the walks they are not of; wrong floors count infinite."""
+    return held_out(survey, n).errors
+
+
+def held_out(survey: Survey, n: int = 300) -> HeldOut:
+    """The same errors, and of which fingerprints they are."""
     if len(survey.walks) < 2 or not len(survey):
-        return np.empty(0)
+        return HeldOut(np.empty(0, np.int64), np.empty(0))
     radio_map = SparseKnn(survey)
-    errors = []
+    rows: list[int] = []
+    errors: list[float] = []
     for row in np.unique(np.linspace(0, len(survey) - 1, n).astype(np.int64)).tolist():
         part = slice(int(survey.indptr[row]), int(survey.indptr[row + 1]))
         columns = survey.indices[part]
@@ -49,6 +64,6 @@ def held_out_errors(survey: Survey, n: int = 300) -> Array:
             continue
         fix = fix_of(near, len(survey.floors))
         x, y = survey.xy[row]
-        same = fix.floor == survey.floor[row]
-        errors.append(float(np.hypot(fix.x - x, fix.y - y)) if same else np.inf)
-    return np.array(errors)
+        rows.append(row)
+        errors.append(math.hypot(fix.x - x, fix.y - y) if fix.floor == survey.floor[row] else math.inf)
+    return HeldOut(np.array(rows, np.int64), np.array(errors))

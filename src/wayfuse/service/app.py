@@ -22,9 +22,12 @@ from wayfuse.service.routes import (
     web_assets,
     web_particles,
     web_plan,
+    web_radio,
+    web_survey,
 )
 from wayfuse.service.security import SecurityHeaders
 from wayfuse.service.server import Server
+from wayfuse.service.web.surveys import Surveys
 
 __all__ = ["create_app"]
 
@@ -56,8 +59,9 @@ def create_app(server: Server) -> FastAPI:
         docs_url=None,  # both would load scripts from another host
         redoc_url=None,
     )
-    app.state.server = server
-    for part in (inputs, outputs, stream, web_plan, web_particles, admin, pages, web_assets):
+    app.state.server, app.state.surveys = server, Surveys(server)
+    web = (web_plan, web_particles, web_radio, web_survey, web_assets)
+    for part in (inputs, outputs, stream, admin, pages, *web):
         app.include_router(part.router)
     handle_problems(app)
     app.add_middleware(SecurityHeaders)

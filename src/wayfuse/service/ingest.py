@@ -16,7 +16,7 @@ from wayfuse.service.pipeline import BusyError, Item
 from wayfuse.service.server import Server
 from wayfuse.storage.log import Entry
 
-__all__ = ["Accepted", "ingest", "the_site"]
+__all__ = ["Accepted", "completed", "ingest", "the_site"]
 
 _LARGE = 200_000  # bytes; what takes longer to read goes to a thread, for others wait meanwhile
 
@@ -60,7 +60,7 @@ async def ingest(server: Server, site: str, adapter: str, body: bytes, profile: 
     if version is None:
         raise UsageError(f"site {site} has no radio map yet", remedy="upload and publish one")
     arrived = server.clock()
-    profile = await _completed(server, adapter, body, profile)
+    profile = await completed(server, adapter, body, profile)
     try:
         if len(body) > _LARGE:
             messages = await run_in_threadpool(ADAPTERS[adapter].read, body, profile, arrived)
@@ -98,7 +98,7 @@ class _Names(msgspec.Struct, rename="camel"):
     device_id: str = ""
 
 
-async def _completed(server: Server, adapter: str, body: bytes, profile: Profile) -> Profile:
+async def completed(server: Server, adapter: str, body: bytes, profile: Profile) -> Profile:
     """The profile with what the phone's enrolment says, where the body's format leaves the platform open."""
     if adapter != "sensor-logger" or profile.platform:
         return profile

@@ -1,0 +1,171 @@
+"""What a survey collects, in files beside the database: scans that phones push, walks tapped on the map, recordings.
+
+::
+
+    FOLDER/scans/DEVICE.jsonl     a line per push: when it arrived, the phone's newest time in it, its Wi-Fi scans
+    FOLDER/walks/ID.json          a walk: which phone, and where it was when (server's clock)
+    FOLDER/recordings/ID-NAME     uploaded files, as they came
+
+Nothing here is deleted by itself: a survey is made to last. The page and the interface delete single parts.
+"""
+
+from __future__ import annotations
+
+import re
+import threading
+from collections.abc import Iterator
+from hashlib import sha256
+from pathlib import Path
+
+import msgspec
+
+from wayfuse.core.errors import UsageError
+from wayfuse.service.wire import Name, Scan
+
+__all__ = ["Phone", "Push", "SurveyStore", "TappedWalk", "Waypoint"]
+
+_ID = re.compile(r"[0-9a-f]{16}")
+_UNSAFE = re.compile(r"[^A-Za-z0-9._-]+")
+_MOST_BYTES = 512 << 20  # of a site's survey; a surveyor of a large mall fills a few tens of megabytes
+
+
+class Push(msgspec.Struct, frozen=True):
+    """Scans that came together. arrived : Unix s, server. newest : s, phone, of the newest record in the push."""
+
+    arrived: float
+    newest: float
+    scans: list[Scan]
+
+
+class Waypoint(msgspec.Struct, frozen=True):
+    """A place (m, frame of the floor) at a time (Unix s, server)."""
+
+    t: float
+    floor: int
+    x: float
+    y: float
+
+
+class TappedWalk(msgspec.Struct, frozen=True):
+    """Waypoints of a phone; between two of them it went straight, or stood where they are one place."""
+
+    device: Name
+    waypoints: list[Waypoint]
+
+
+class Phone(msgspec.Struct, frozen=True):
+    """A phone that pushes scans for the survey: its pseudonym, when it was heard last (Unix s), how many scans."""
+
+    device: str
+    heard: float
+    scans: int
+
+
+class SurveyStore:
+    """The files of one site's survey; used from any thread."""
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+        self._lock = threading.Lock()
+        self._phones: dict[str, Phone] = {}
+        for path in self._in("scans"):
+            pushes = list(self.pushes(path.stem))
+            self._phones[path.stem] = Phone(
+                path.stem, pushes[-1].arrived if pushes else 0.0, sum(len(p.scans) for p in pushes)
+            )
+
+    # --- scans
+
+    def add_push(self, device: str, push: Push) -> None:
+        """Keep scans of a phone (by its pseudonym); a push without scans only says that the phone is there."""
+        with self._lock:
+            self._check_room()
+            known = self._phones.get(device, Phone(device, 0.0, 0))
+            path = self._path("scans", f"{_checked(device)}.jsonl")
+            with path.open("ab") as out:
+                out.write(msgspec.json.encode(push) + b"\n")
+            self._phones[device] = Phone(device, push.arrived, known.scans + len(push.scans))
+
+    def pushes(self, device: str) -> Iterator[Push]:
+        """All pushes of a phone; a line cut off by a crash is left out."""
+        path = self._path("scans", f"{_checked(device)}.jsonl")
+        if not path.is_file():
+            return
+        with path.open("rb") as lines:
+            for line in lines:
+                try:
+                    yield msgspec.json.decode(line, type=Push)
+                except msgspec.DecodeError:
+                    continue
+
+    def phones(self) -> list[Phone]:
+        """Phones that pushed, the last heard first."""
+        with self._lock:
+            return sorted(self._phones.values(), key=lambda p: -p.heard)
+
+    # --- walks
+
+    def add_walk(self, walk: TappedWalk) -> str:
+        """Keep a walk; its identifier."""
+        body = msgspec.json.encode(walk)
+        name = sha256(body).hexdigest()[:16]
+        with self._lock:
+            self._check_room()
+            self._path("walks", f"{name}.json").write_bytes(body)
+        return name
+
+    def walks(self) -> dict[str, TappedWalk]:
+        """All walks by identifier."""
+        return {p.stem: msgspec.json.decode(p.read_bytes(), type=TappedWalk) for p in self._in("walks")}
+
+    # --- recordings
+
+    def add_recording(self, name: str, body: bytes) -> tuple[str, Path]:
+        """Keep an uploaded file; its identifier and where it lies."""
+        identifier = sha256(body).hexdigest()[:16]
+        tidy = _UNSAFE.sub("-", name)[-80:].lstrip(".-") or "recording"
+        with self._lock:
+            self._check_room()
+            known = next(self._folder.glob(f"recordings/{identifier}-*"), None)
+            path = known or self._path("recordings", f"{identifier}-{tidy}")
+            path.write_bytes(body)
+        return identifier, path
+
+    def recordings(self) -> dict[str, Path]:
+        """All uploaded files by identifier."""
+        return {p.name[:16]: p for p in self._in("recordings")}
+
+    def remove(self, identifier: str) -> bool:
+        """Delete a walk or a recording; whether there was one."""
+        if not _ID.fullmatch(identifier):
+            return False
+        with self._lock:
+            found = [
+                *self._folder.glob(f"walks/{identifier}.json"),
+                *self._folder.glob(f"recordings/{identifier}-*"),
+            ]
+            for path in found:
+                path.unlink()
+        return bool(found)
+
+    # --- files
+
+    def _path(self, kind: str, name: str) -> Path:
+        folder = self._folder / kind
+        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+        return folder / name
+
+    def _in(self, kind: str) -> list[Path]:
+        return sorted(self._folder.glob(f"{kind}/*"))
+
+    def _check_room(self) -> None:
+        if sum(p.stat().st_size for p in self._folder.rglob("*") if p.is_file()) > _MOST_BYTES:
+            raise UsageError(
+                "the survey of this site is full", remedy="delete recordings that are no longer needed"
+            )
+
+
+def _checked(device: str) -> str:
+    if not _ID.fullmatch(device):
+        raise UsageError("no phone of this survey", remedy="list them at /api/v1/survey")
+    return device
