@@ -56,7 +56,9 @@ METHODS: Mapping[str, Method] = {
     "nnss": Method("nearest neighbour in signal space, scan by scan"),
     "pdr": Method("steps from a known start (--start)", ("start",), ()),
     "chu2009": Method(
-        "Chu 2009: interpolated fingerprints, steps, walls, stairs and lifts", hears=("scans", "pressure")
+        "Chu 2009: interpolated fingerprints, steps, walls, stairs and lifts",
+        hears=("scans", "pressure"),
+        may_start=True,
     ),
     "he2014": Method("He 2014: Gaussian-process radio map, adaptive motion model", may_start=True),
     "karlsson2015": Method("Karlsson 2015: path loss of both bands, steps, heading unknown", ("places",)),

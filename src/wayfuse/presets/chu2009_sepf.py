@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import NamedTuple, cast
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,7 +26,7 @@ from wayfuse.models.constraint.speed_filter import SpeedFilter, SpeedState
 from wayfuse.models.constraint.walkable_mask import WalkableMask
 from wayfuse.models.motion.connectors import ConnectorMotion
 from wayfuse.models.motion.displaced_disc import StepDisc
-from wayfuse.models.motion.pdr import PdrMotion, StepInput
+from wayfuse.models.motion.pdr import StepInput
 from wayfuse.models.motion.random_connectors import RandomConnectors
 from wayfuse.models.observation.mapped import MapLikelihood
 from wayfuse.models.relocation import Relocation
@@ -156,7 +156,7 @@ class _Sepf:
         self.filter = WideningFilter(wider=scaling("r_max"), rounds=c.rounds, filter=self.plain)
         self.floors = FloorChange(
             connectors=ConnectorMotion(site=site, leave_stairs=1.0, leave_lift=1.0),
-            steps=cast("PdrMotion", self.motion),
+            steps=self.motion,
             filter=self.plain,
             constraint=self.walls,
         )

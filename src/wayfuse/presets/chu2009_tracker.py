@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import cast
 
 from wayfuse.core.errors import UsageError
 from wayfuse.filters.particle_filter import ParticleFilter
@@ -14,7 +13,6 @@ from wayfuse.models.constraint.step_speed import StepSpeedFilter
 from wayfuse.models.initial import KnownStart
 from wayfuse.models.motion.connectors import ConnectorMotion
 from wayfuse.models.motion.displaced_disc import StepDisc
-from wayfuse.models.motion.pdr import PdrMotion
 from wayfuse.models.motion.random_walk import RandomWalk
 from wayfuse.models.observation.mapped import MapLikelihood
 from wayfuse.models.placed_start import ToldStart
@@ -76,9 +74,7 @@ def build(
     motion, plain = StepDisc(r_max=c.r_max), ParticleFilter(ess_ratio=1.0)
     steps = WideningFilter(wider=scaling("r_max"), rounds=c.rounds, filter=plain)
     told = start and KnownStart(x=start.x, y=start.y, floor=start.floor, sigma=0.5 * c.start_radius)
-    floors = FloorChange(
-        connectors=ConnectorMotion(site=site), steps=cast("PdrMotion", motion), filter=plain, constraint=walls
-    )
+    floors = FloorChange(connectors=ConnectorMotion(site=site), steps=motion, filter=plain, constraint=walls)
     engine = PlainEngine(
         n_floors=len(site.floors),
         prior=prior_estimate(site),

@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 from wayfuse.core.errors import ConfigError
 from wayfuse.core.philox import Noise
 from wayfuse.filters.cloud import NO_CONNECTOR, Cloud
-from wayfuse.filters.particle_filter import Constraint, FilterState, ParticleFilter
+from wayfuse.filters.particle_filter import Constraint, FilterState, MotionModel, ParticleFilter
 from wayfuse.inertial.vertical import VerticalEvent
 from wayfuse.models.motion.connectors import ConnectorMotion
-from wayfuse.models.motion.pdr import PdrMotion, StepInput
+from wayfuse.models.motion.pdr import StepInput
 
 __all__ = ["FloorChange", "Movement"]
 
@@ -44,7 +44,7 @@ class FloorChange:
     """
 
     connectors: ConnectorMotion
-    steps: PdrMotion
+    steps: MotionModel[StepInput]
     filter: ParticleFilter
     constraint: Constraint | None = None
     memory: float = 8.0
