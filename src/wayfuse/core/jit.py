@@ -5,7 +5,7 @@ GIL. Kernels draw no random numbers of their own, take no options or strings and
 validates, the kernel trusts. A division by zero gives an infinity, as in NumPy: a check for it, as Python has, would
 keep every loop with a division from being vectorised. ``fastmath`` stays off, for it assumes that no infinity occurs;
 `fast_kernel` allows the re-association of sums (not the removal of NaN and infinity checks), where a loop is to be
-vectorised. Set ``NUMBA_DISABLE_JIT=1`` to run every kernel as the plain Python it also is.
+vectorised. Without numba, or with ``NUMBA_DISABLE_JIT=1``, every kernel runs as the plain Python it also is.
 """
 
 from __future__ import annotations
@@ -13,30 +13,43 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, TypeVar, cast
 
-import numba
-
 __all__ = ["bounded_kernel", "fast_kernel", "inline_kernel", "kernel"]
 
 F = TypeVar("F", bound=Callable[..., Any])
 
 
+def _compiler() -> Any:
+    try:
+        import numba
+    except ImportError:  # the same results, within rounding, at the speed of Python
+        return None
+    return numba
+
+
+_NUMBA = _compiler()
+
+
 def kernel(function: F) -> F:
     """Compile a kernel (cached on disk, GIL released, IEEE arithmetic)."""
-    return cast("F", numba.njit(cache=True, nogil=True, fastmath=False, error_model="numpy")(function))
+    return _compiled(function, fastmath=False)
 
 
 def fast_kernel(function: F) -> F:
     """Compile a kernel whose sums may be re-associated and contracted; NaN and infinity keep their meaning."""
-    flags = {"reassoc", "contract", "arcp", "nsz"}
-    return cast("F", numba.njit(cache=True, nogil=True, fastmath=flags, error_model="numpy")(function))
+    return _compiled(function, fastmath={"reassoc", "contract", "arcp", "nsz"})
 
 
 def bounded_kernel(function: F) -> F:
     """Compile a kernel whose arrays hold neither NaN nor infinity, as its caller sees to: greatest values vectorise."""
-    return cast("F", numba.njit(cache=True, nogil=True, fastmath=True, error_model="numpy")(function))
+    return _compiled(function, fastmath=True)
 
 
 def inline_kernel(function: F) -> F:
     """Compile a scalar helper that is inlined into the kernels that call it."""
-    compiled = numba.njit(cache=True, nogil=True, fastmath=False, inline="always", error_model="numpy")
-    return cast("F", compiled(function))
+    return _compiled(function, fastmath=False, inline="always")
+
+
+def _compiled(function: F, **options: Any) -> F:
+    if _NUMBA is None:
+        return function
+    return cast("F", _NUMBA.njit(cache=True, nogil=True, error_model="numpy", **options)(function))

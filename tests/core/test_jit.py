@@ -1,0 +1,46 @@
+"""The tracker without its compiler: the same estimates, but for rounding."""
+
+from __future__ import annotations
+
+import csv
+import os
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+WITHOUT_NUMBA = "import sys; sys.modules['numba'] = None; from wayfuse.cli.main import main; main()"
+COMPILED = "from wayfuse.cli.main import main; main()"
+
+
+def estimates(world: Any, out: Path, program: str, **environment: str) -> list[dict[str, str]]:
+    walk = sorted((world.folder / "walks").rglob("*.txt"))[0]
+    done = subprocess.run(
+        [sys.executable, "-c", program, "track", str(world.folder / "SITE"), str(walk),
+         "--radio-map", str(world.folder / "map.npz"), "--particles", "60", "--out", str(out)],
+        capture_output=True, text=True, check=False, env={**os.environ, **environment},
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr[-3000:]
+    with out.open(newline="") as stream:
+        return list(csv.DictReader(stream))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("program", "environment"), [(WITHOUT_NUMBA, {}), (COMPILED, {"NUMBA_DISABLE_JIT": "1"})]
+)
+def test_a_walk_is_tracked_whole_without_the_compiler(
+    world: Any, tmp_path: Path, program: str, environment: dict[str, str]
+) -> None:
+    want = estimates(world, tmp_path / "compiled.csv", COMPILED)
+    got = estimates(world, tmp_path / "plain.csv", program, **environment)
+    assert len(want) > 20
+    assert [row["t_ms"] for row in got] == [row["t_ms"] for row in want]
+    assert [row["floor"] for row in got] == [row["floor"] for row in want]
+    far = [np.hypot(*(float(a[k]) - float(b[k]) for k in ("x", "y"))) for a, b in zip(got, want, strict=True)]
+    # rounding may turn one particle's ancestor: the estimate of sixty then moves by a sixtieth of the cloud
+    assert max(far) < 0.5
+    assert np.median(far) < 0.01
