@@ -52,9 +52,10 @@ class CourseAndSpeed:
 
     def propagate(self, noise: Noise, cloud: Cloud, event: float) -> Cloud:
         """Move on for ``event`` seconds (Eq. 4)."""
-        x, y = cloud.x.astype(np.float64), cloud.y.astype(np.float64)
-        vx = cloud.step_scale * np.cos(cloud.heading_bias, dtype=np.float64)
-        vy = cloud.step_scale * np.sin(cloud.heading_bias, dtype=np.float64)
+        x, y, course, speed = (
+            column.astype(np.float64) for column in (cloud.x, cloud.y, cloud.heading_bias, cloud.step_scale)
+        )
+        vx, vy = speed * np.cos(course), speed * np.sin(course)
         dt = min(max(event, 0.0), self.longest)
         moved = ConstantVelocity(self.acceleration_sigma).propagate(noise, MovingCloud(x, y, vx, vy), dt)
         return cloud._replace(
