@@ -57,7 +57,7 @@ def running_server() -> Iterator[str]:
         with socket.socket() as probe:
             probe.bind(("127.0.0.1", 0))
             port = probe.getsockname()[1]
-        options = ["-p", str(port), "-c", "listen_addresses=127.0.0.1", "-k", str(folder)]
+        options = ["-p", str(port), "-c", "listen_addresses=127.0.0.1", "-c", "fsync=off", "-k", str(folder)]
         server = subprocess.Popen(
             [binaries / "postgres", "-D", data, *options],
             cwd=folder,
@@ -69,7 +69,7 @@ def running_server() -> Iterator[str]:
             _wait([binaries / "pg_isready", "-h", "127.0.0.1", "-p", str(port)])
             yield f"postgresql://wayfuse@127.0.0.1:{port}"
         finally:
-            server.send_signal(signal.SIGINT)  # "fast": does not wait for clients
+            server.send_signal(signal.SIGQUIT)  # at once: nothing of it is kept
             server.wait(30)
     finally:
         shutil.rmtree(folder, ignore_errors=True)

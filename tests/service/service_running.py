@@ -152,10 +152,10 @@ class App:
 
 
 @contextmanager
-def started(world: Any, data: Path, **settings: Any) -> Iterator[App]:
+def started(world: Any, data: Path, radio_map: str | None = "map.npz", **settings: Any) -> Iterator[App]:
     """A server of the small world in this process."""
     values = {"particles": 100, "rate_per_s": 0.0} | settings
-    files = SiteFiles(world.folder / "SITE", world.folder / "map.npz")
+    files = SiteFiles(world.folder / "SITE", world.folder / radio_map if radio_map else None)
     server = Server(Settings(data=str(data), **values), [files], clock=time.time, random=secrets.token_bytes)
     with TestClient(create_app(server), raise_server_exceptions=False) as client:
         yield App(server, client)

@@ -180,11 +180,10 @@ def test_checkpoints_and_estimates_come_back_to_the_bit(engine: Engine) -> None:
 def test_a_round_is_written_whole_or_not_at_all(engine: Engine) -> None:
     store = TrackStore(engine)
     row = TrackRow("t", "site", "d", 1, 5.0, 6.0)
-    store.save(1, [Checkpoint(row, 0, [_estimate(1.0)], b"one")])
+    store.save(1, [Checkpoint(row, 0, [_estimate(1.0), _estimate(2.0)], b"one")])
+    twice = Checkpoint(row, 1, [_estimate(2.0)], b"y")  # there is a number 1 already
     with pytest.raises(IntegrityError):
-        store.save(
-            2, [Checkpoint(row._replace(track="u"), 0, [], b"x"), Checkpoint(row, 0, [_estimate(2.0)], b"y")]
-        )
+        store.save(2, [Checkpoint(row._replace(track="u"), 0, [], b"x"), twice])
     assert store.round() == 1
     assert store.state("u") is None
     assert store.state("t") == (row, b"one")

@@ -23,7 +23,7 @@ from wayfuse.storage.tracks import Checkpoint, TrackRow
 from wayfuse.tracking.estimate import Estimate
 from wayfuse.tracking.tracker import TrackState
 
-__all__ = ["Applied", "Live", "View", "profile_json", "read_entry"]
+__all__ = ["Applied", "Live", "Look", "View", "profile_json", "read_entry"]
 
 _log = logging.getLogger(__name__)
 Recall = Callable[[str], tuple[TrackRow, bytes] | None]
@@ -38,6 +38,15 @@ class View(NamedTuple):
     ahead: float
     counts: Mapping[str, int]
     is_ended: bool
+
+
+class Look(NamedTuple):
+    """A track and the estimates that are not written yet, from number ``first`` on. is_live : it is in memory."""
+
+    view: View
+    first: int
+    recent: list[Estimate]
+    is_live: bool
 
 
 class Applied(NamedTuple):
@@ -137,6 +146,13 @@ class Live:
         return held
 
     def _load(self, track: str) -> _Held | None:
+        held = self._recalled(track)
+        if held is not None:
+            self._held[track] = held
+        return held
+
+    def _recalled(self, track: str) -> _Held | None:
+        """A track as its checkpoint has it."""
         kept = self._recall(track)
         if kept is None or kept[0].site not in self._worlds:
             return None
@@ -150,9 +166,7 @@ class Live:
         if not isinstance(memory, Memory):
             raise FormatError("a checkpoint that is no memory of a track", where=track)
         tracker = self._worlds[row.site].tracker(row.map_version)
-        held = _Held(row, LiveTrack.recall(tracker, memory, self._config), is_dirty=False)
-        self._held[track] = held
-        return held
+        return _Held(row, LiveTrack.recall(tracker, memory, self._config), is_dirty=False)
 
     def load(self, track: str) -> bool:
         """Bring a track from its checkpoint into memory; whether there is such a track."""
@@ -206,11 +220,15 @@ class Live:
             held = self._held.get(track)
             return None if held is None else held.track.state
 
-    def recent(self, track: str) -> tuple[int, list[Estimate]]:
-        """The estimates of a track that are not written yet, and the number of the first."""
+    def look(self, track: str) -> Look | None:
+        """A track in memory, or as its checkpoint has it; None where it has none."""
         with self._lock:
             held = self._held.get(track)
-            return (0, []) if held is None else (held.track.first, held.track.undrained())
+            is_live = held is not None
+            held = held or self._recalled(track)
+            if held is None:
+                return None
+            return Look(self._view(held), held.track.first, held.track.undrained(), is_live)
 
     @staticmethod
     def _view(held: _Held) -> View:

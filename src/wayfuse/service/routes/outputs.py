@@ -12,7 +12,7 @@ from fastapi.responses import Response
 
 from wayfuse.service.access import SCHEME, allowed, server_of, site_of
 from wayfuse.service.export import to_csv, to_gpx
-from wayfuse.service.live import View
+from wayfuse.service.live import Look, View
 from wayfuse.service.positions import collection, feature
 from wayfuse.service.problems import Problem, responses
 from wayfuse.service.routes.examples import POSITION
@@ -82,24 +82,21 @@ def tracks(
     }
     of = [r for r in rows.values() if not device or r.device == device]
     newest = sorted(of, key=lambda r: (-r.heard, r.track))[:limit]
-    return {"tracks": [_summary(r, views.get(r.track)) for r in newest]}
+    return {"tracks": [_summary(r, views.get(r.track), is_live=r.track in views) for r in newest]}
 
 
 @router.get("/tracks/{track}", summary="One track, with its counters", responses=responses(404))
 def track(request: Request, token: Reader, track: str) -> dict[str, Any]:
     """What is known of a track besides its places."""
-    server = server_of(request)
-    row = _row(server, token, track)
-    return _summary(row, server.live.view(track))
+    look = _look(server_of(request), token, track)
+    return _summary(look.view.row, look.view, is_live=look.is_live)
 
 
 @router.get("/tracks/{track}/position", summary="Where somebody is", responses=responses(404))
 def position(request: Request, token: Reader, track: str) -> dict[str, Any]:
     """GeoJSON of the latest position."""
     server = server_of(request)
-    row = _row(server, token, track)
-    view = server.live.view(track) or _stored(server, row)
-    found = server.feature(view)
+    found = server.feature(_look(server, token, track).view)
     if found is None:
         raise Problem(404, "no position yet", "post a Wi-Fi scan first")
     return found
@@ -116,9 +113,9 @@ def estimates(
 ) -> dict[str, Any]:
     """GeoJSON of the estimates of a span of time, in order; the newest ``limit`` of them."""
     server = server_of(request)
-    row = _row(server, token, track)
-    numbered = _estimates(server, row, since, until)[-limit:]
-    site = server.worlds[row.site].site
+    look = _look(server, token, track)
+    numbered = _estimates(server, look, since, until)[-limit:]
+    site = server.worlds[look.view.row.site].site
     return collection(feature(site, e, {"track": track, "n": n}) for n, e in numbered)
 
 
@@ -139,9 +136,10 @@ def export(
 ) -> Response:
     """CSV with everything, or GPX 1.1."""
     server = server_of(request)
-    row = _row(server, token, track)
+    look = _look(server, token, track)
+    row = look.view.row
     site = server.worlds[row.site].site
-    said = [e for _, e in _estimates(server, row, since, until)]
+    said = [e for _, e in _estimates(server, look, since, until)]
     text = to_csv(site, said) if format == "csv" else to_gpx(site, said, track)
     headers = {"Content-Disposition": f'attachment; filename="{row.track}.{format}"'}
     return Response(text, media_type=_MEDIA[format], headers=headers)
@@ -152,40 +150,34 @@ def _wanted(server: Server, token: Token, site: str) -> str:
     return site_of(server, token, site) if site or token.site else ""
 
 
-def _row(server: Server, token: Token, track: str) -> TrackRow:
-    view = server.live.view(track)
-    row = view.row if view is not None else server.tracks.row(track) if _TRACK.fullmatch(track) else None
-    if row is None or row.site not in server.worlds or token.site not in {"", row.site}:
+def _look(server: Server, token: Token, track: str) -> Look:
+    look = server.live.look(track) if _TRACK.fullmatch(track) else None
+    if look is None or look.view.row.site not in server.worlds or token.site not in {"", look.view.row.site}:
         raise Problem(404, "no such track", "list them at /api/v1/tracks")
-    return row
-
-
-def _stored(server: Server, row: TrackRow) -> View:
-    n = server.tracks.n_estimates(row.track)
-    return View(row, server.tracks.last_estimate(row.track), n - 1, float("nan"), {}, is_ended=False)
+    return look
 
 
 def _estimates(
-    server: Server, row: TrackRow, since: float | None, until: float | None
+    server: Server, look: Look, since: float | None, until: float | None
 ) -> list[tuple[int, Estimate]]:
-    """Numbered estimates: those that are written, then those in memory."""
-    first, recent = server.live.recent(row.track)
+    """Numbered estimates: those that are written, then those that are not yet."""
+    track, first = look.view.row.track, look.first
     for _ in range(20):  # what has settled is on its way into the database
-        if server.tracks.n_estimates(row.track) >= first:
+        if server.tracks.n_estimates(track) >= first:
             break
         time.sleep(0.05)
-    written = server.tracks.estimates(row.track, since, until)
+    written = server.tracks.estimates(track, since, until)
     inside = [
         (n, e)
-        for n, e in enumerate(recent, first)
+        for n, e in enumerate(look.recent, first)
         if (since is None or e.t >= since) and (until is None or e.t <= until)
     ]
-    return [(n, e) for n, e in written if not recent or n < first] + inside
+    return [(n, e) for n, e in written if n < first] + inside
 
 
-def _summary(row: TrackRow, view: View | None) -> dict[str, Any]:
+def _summary(row: TrackRow, view: View | None, *, is_live: bool) -> dict[str, Any]:
     out: dict[str, Any] = row._asdict()
-    out["is_live"] = view is not None
+    out["is_live"] = is_live
     if view is not None:
         out |= {"is_ended": view.is_ended, "estimates": view.number + 1, "counts": dict(view.counts)}
         out["clock_ahead_s"] = view.ahead if math.isfinite(view.ahead) else None
