@@ -38,9 +38,10 @@ def skip_loudly(what: str) -> NoReturn:
 
 @dataclass(frozen=True)
 class House:
-    """A simulated house in files, and the walk of a phone through it that changes floors."""
+    """A simulated house in files, its surveyors' recordings, and the walk of a phone through it that changes floors."""
 
     folder: Path
+    survey: list[Path]
     walk: Recording
 
 
@@ -60,7 +61,7 @@ def house(tmp_path_factory: pytest.TempPathFactory) -> House:
     walks = [survey_walk(site, read(path))[0] for path in demo.survey]
     survey = survey_from_walks([w for w in walks if w is not None], site.floor_names)
     WalkRadioMap(survey, SurveyParameters(), site.name).save(folder / "map.npz")
-    return House(folder, read(demo.walks[0]))
+    return House(folder, demo.survey, read(demo.walks[0]))
 
 
 @dataclass

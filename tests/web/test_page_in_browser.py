@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import time
 from collections.abc import Callable
 from typing import Any
 
@@ -177,3 +178,73 @@ def test_without_the_map_library_the_page_says_how_to_build_it(look: Callable[..
     page.until(lambda: "make web" in page.page.inner_text("#notice"))
     assert all("404" in said for said in page.complaints)
     page.complaints.clear()
+
+
+def test_survey_pictures_are_drawn_and_go_away(look: Callable[..., Any], served: Any) -> None:
+    page = look()
+    page.enter(served.token)
+    page.page.click("#tab-survey")
+    page.page.check("[value=coverage]")
+    page.until(lambda: "fingerprints" in page.page.inner_text("#view-survey"))
+    page.until(lambda: page.page.is_visible("#legend"))
+    has_raster = "() => Boolean(document.querySelector('#map').map.getLayer('raster'))"
+    page.until(lambda: page.page.evaluate(has_raster))
+    page.page.check("[value=heat]")
+    page.until(lambda: "heard by" in page.page.inner_text("#view-survey"))
+    page.until(lambda: "dBm" in page.page.inner_text("#legend"))
+    page.page.click("#tab-tracks")
+    page.until(lambda: not page.page.evaluate(has_raster))
+    assert not page.page.is_visible("#legend")
+
+
+def test_a_place_is_recorded_by_a_press_on_the_map(look: Callable[..., Any], served: Any) -> None:
+    page = look()
+    page.enter(served.token)
+    page.page.click("#tab-survey")
+    page.page.click("text=Connect a phone")
+    page.page.click("text=Make a push address")
+    page.page.wait_for_selector("#push-address:not([hidden])")
+    address = page.page.input_value("#push-address").replace("sensor-logger?platform=android", "own")
+    assert address.startswith(f"{served.address}/survey/in/wf_")
+
+    def push(number: int) -> None:
+        t = time.time()
+        aps = [[f"02:00:00:00:00:{k:02x}", -50.0 - k, 2412.0, t] for k in range(6)]
+        body = {"v": 1, "device": "hand", "track": "survey", "id": number, "wifi": [{"t": t, "aps": aps}]}
+        with served.client() as client:
+            assert client.post(address, json=body).status_code == 200
+
+    push(0)
+    page.until(lambda: page.page.is_enabled("text=Stand here"))
+    page.page.click("text=Stand here")
+    at = page.page.evaluate(
+        "() => { const map = document.querySelector('#map').map; const at = map.project(map.getCenter());"
+        " const box = map.getContainer().getBoundingClientRect(); return [box.x + at.x + 40, box.y + at.y + 30]; }"
+    )
+    page.page.mouse.click(*at)
+    page.until(lambda: "Stand still" in page.page.inner_text("#view-survey"))
+    for number in range(1, 4):
+        push(number)
+        page.page.wait_for_timeout(700)
+    page.until(lambda: "3 scans so far" in page.page.inner_text("#view-survey"))
+    page.page.click("text=Finish")
+    page.until(lambda: "1 walks by hand" in page.page.inner_text("#view-survey"))
+    with served.client() as client:
+        (walk,) = client.get("/api/v1/survey").json()["walks"]
+        lon, lat = page.page.evaluate(
+            "(at) => { const map = document.querySelector('#map').map;"
+            " const box = map.getContainer().getBoundingClientRect();"
+            " const p = map.unproject([at[0] - box.x, at[1] - box.y]); return [p.lng, p.lat]; }",
+            at,
+        )
+        frame = client.get("/api/v1/plan").json()["floors"][walk["taps"][0]["floor"]]
+        (a, b), (c, d) = frame["matrix"]
+        for tap in walk["taps"]:
+            assert frame["origin"][0] + a * tap["x"] + b * tap["y"] == pytest.approx(lon, abs=2e-7)
+            assert frame["origin"][1] + c * tap["x"] + d * tap["y"] == pytest.approx(lat, abs=2e-7)
+    assert walk["taps"][1]["t"] - walk["taps"][0]["t"] > 1.5
+    page.page.click("text=Build a radio map")
+    page.until(lambda: "1 walks. Publish it" in page.page.inner_text("#view-survey"))
+    page.page.click("#view-survey details:has(.parts) summary")
+    page.page.click("text=Delete")
+    page.until(lambda: "0 walks by hand" in page.page.inner_text("#view-survey"))

@@ -18,10 +18,10 @@ from wayfuse.radio.survey import Survey
 
 __all__ = ["Grid", "cells_of", "coverage", "heard_at", "level_of", "next_places"]
 
-CELL = 1.0  # m
+CELL = 0.5  # m
 _FAR = 5.0  # m from the next fingerprint; a place farther away has to be surveyed
 _PLACE = 2.0  # m, fingerprints in one square are one training place of an access point's level
-_MOST_CELLS = 250_000
+_MOST_CELLS = 60_000  # of a floor; beyond, cells are larger
 
 
 class Grid(NamedTuple):

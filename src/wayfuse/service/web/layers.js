@@ -53,6 +53,10 @@ const LAYERS = [
     paint: () => ({ "circle-radius": zoomed(17, 1.2, 21, 2.6), "circle-color": ["get", "colour"], "circle-opacity": ["get", "opacity"] }),
   },
   {
+    id: "walked", type: "line", source: "points", layout: { "line-cap": "round" },
+    paint: (p) => ({ "line-color": p.point, "line-width": 2, "line-dasharray": [2, 2] }),
+  },
+  {
     id: "points", type: "circle", source: "points",
     paint: (p) => ({ "circle-radius": 5, "circle-color": p.point, "circle-stroke-color": p.halo, "circle-stroke-width": 1.5 }),
   },
