@@ -33,10 +33,11 @@ class Config:
     radius: float = 1.0  # m, disc of a standing user, Sec. II-B
     length_sigma: float = 0.1  # m, Eq. 4; not printed
     heading_sigma: float = 0.1  # rad, Eq. 5; not printed
-    n_aps: int = 120  # access points that have a field, those heard at most places; the paper has 4
+    n_aps: int = 4000  # access points that may have a field, those heard at most places; the paper has 4
     aps: float = 4.0  # a scan counts for no more access points than the paper's had
     max_points: int = 500  # places of a floor that the process is fitted to
-    step: float = 1.0  # m, grid of the field
+    step: float = 1.0  # m, grid of the field; wider where a floor would need more nodes
+    max_nodes: int = 4000  # of a floor
     start_sigma: float = 1.0  # m, of a start that is told
     diffusion: float = 0.5  # m per root second and axis, without motion sensors: the disc once a second
 
@@ -67,7 +68,7 @@ def build(
     check_floors(site, survey)
     c = config or Config()
     survey = most_heard(survey, c.n_aps)
-    field = gaussian_process.fit(survey, step=c.step, max_points=c.max_points)
+    field = gaussian_process.fit(survey, step=c.step, max_points=c.max_points, max_nodes=c.max_nodes)
     told = start and KnownStart(x=start.x, y=start.y, floor=start.floor, sigma=c.start_sigma)
     engine = PlainEngine(
         n_floors=len(site.floors),
