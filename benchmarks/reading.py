@@ -13,9 +13,11 @@ import gc
 import math
 import os
 import statistics
+import tempfile
 import time
 from collections.abc import Callable
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -110,11 +112,14 @@ def _scan(t: float, readings: list[tuple[object, ...]]) -> WifiScan:
     )
 
 
+if TYPE_CHECKING:
+    from benchmarks.report import Table, Target
+
 READERS: dict[str, Callable[[Path], Recording]] = {"plain loop": plain_read, "wayfuse": ms_indoor.read}
 
 
-def measure(paths: list[Path], rounds: int) -> dict[str, list[list[float]]]:
-    """Seconds per reader, file and round; in each round one reader reads all files, then the other."""
+def timed(paths: list[Path], rounds: int) -> dict[str, list[list[float]]]:
+    """CPU seconds per reader, file and round; in each round one reader reads all files, then the other."""
     times: dict[str, list[list[float]]] = {name: [[] for _ in paths] for name in READERS}
     for path in paths:
         for reader in READERS.values():
@@ -123,38 +128,79 @@ def measure(paths: list[Path], rounds: int) -> dict[str, list[list[float]]]:
         for name, reader in READERS.items():
             gc.collect()
             for k, path in enumerate(paths):
-                start = time.perf_counter()
+                start = time.thread_time()
                 reader(path)
-                times[name][k].append(time.perf_counter() - start)
+                times[name][k].append(time.thread_time() - start)
     return times
 
 
+def logs(folder: Path, n: int) -> list[Path]:
+    """About n logs of ms-indoor, spread over the folder."""
+    found = sorted(folder.rglob("path_data_files/*.txt"))
+    return found[:: max(1, len(found) // n)][:n]
+
+
+def motion_only(paths: list[Path], folder: Path) -> list[Path]:
+    """Copies without the lines of Wi-Fi and Bluetooth: header and motion sensors."""
+    kept = []
+    for path in paths:
+        lines = path.read_bytes().splitlines(keepends=True)
+        radio = (b"TYPE_WIFI", b"TYPE_BLUE", b"TYPE_BEACON")
+        kept.append(folder / path.name)
+        kept[-1].write_bytes(b"".join(line for line in lines if not any(kind in line for kind in radio)))
+    return kept
+
+
+def measure(seconds: float) -> tuple[list[Table], list[Target]]:
+    """The table of whole and of motion-only logs and their goals; nothing but a note where ms-indoor is not there."""
+    from benchmarks.report import Table, Target  # a test reads this file for its plain loop alone
+
+    root = Path(os.environ.get("WAYFUSE_DATA") or Path.home() / ".cache" / "wayfuse-data")
+    paths = logs(root / "ms-indoor", 8)
+    columns = ("log", "MB", "plain loop, MB/s", "wayfuse, MB/s", "ratio")
+    goals = {"whole log": 5.0, "motion sensors only": 10.0}
+    if not paths:
+        note = "**Not measured: ms-indoor is not there.** `wayfuse datasets fetch ms-indoor`."
+        missing = [Target(f"reading, {name}, plain Python loop", goal, None) for name, goal in goals.items()]
+        return [Table("Reading logs", note, columns, ())], missing
+    rows, targets = [], []
+    with tempfile.TemporaryDirectory() as folder:
+        for (name, goal), files in zip(goals.items(), (paths, motion_only(paths, Path(folder))), strict=True):
+            times = timed(files, max(2, int(seconds / 2.0)))
+            size = sum(p.stat().st_size for p in files) / 1e6
+            low = {reader: sum(min(f) for f in v) for reader, v in times.items()}
+            mid = {reader: sum(statistics.median(f) for f in v) for reader, v in times.items()}
+            speed = [f"{size / low[r]:.0f} ({size / mid[r]:.0f})" for r in READERS]
+            a, b = (low["plain loop"] / low["wayfuse"], mid["plain loop"] / mid["wayfuse"])
+            rows.append((name, f"{size:.1f}", *speed, f"{a:.1f} ({b:.1f})"))
+            targets.append(Target(f"reading, {name}, plain Python loop", goal, a))
+    note = (
+        f"{len(paths)} logs of ms-indoor; both readers make a whole `Recording`, the plain loop line by line."
+    )
+    return [Table("Reading logs", note, columns, tuple(rows))], targets
+
+
 def main(arguments: list[str] | None = None) -> float:
-    """Print the table; return the ratio of the summed minima (plain loop over wayfuse)."""
+    """Print the figures of a folder of logs; return the ratio of the summed minima (plain loop over wayfuse)."""
     root = Path(os.environ.get("WAYFUSE_DATA") or Path.home() / ".cache" / "wayfuse-data")
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("folder", type=Path, nargs="?", default=root / "ms-indoor")
     parser.add_argument("--files", type=int, default=12)
     parser.add_argument("--rounds", type=int, default=9)
     options = parser.parse_args(arguments)
-    found = sorted(options.folder.rglob("path_data_files/*.txt"))
-    paths = found[:: max(1, len(found) // options.files)][: options.files]
+    paths = logs(options.folder, options.files)
     if not paths:
         raise SystemExit(f"no ms-indoor logs under {options.folder}; run `wayfuse datasets fetch ms-indoor`")
-    times = measure(paths, options.rounds)
-    print(f"{len(paths)} files, {options.rounds} rounds, interleaved; ms (minimum, median) per file")
-    for k, path in enumerate(paths):
-        cells = [
-            f"{name} {min(v[k]) * 1e3:7.2f} {statistics.median(v[k]) * 1e3:7.2f}" for name, v in times.items()
-        ]
-        print(f"{path.stem[:12]:12s} {path.stat().st_size / 1e6:5.2f} MB  {'   '.join(cells)}")
+    times = timed(paths, options.rounds)
     size = sum(p.stat().st_size for p in paths) / 1e6
     low = {name: sum(min(f) for f in v) for name, v in times.items()}
     mid = {name: sum(statistics.median(f) for f in v) for name, v in times.items()}
     for name in READERS:
         print(f"{name:12s} {size / low[name]:6.0f} MB/s (minima) {size / mid[name]:6.0f} MB/s (medians)")
     ratio = low["plain loop"] / low["wayfuse"]
-    print(f"ratio {ratio:.1f} (minima), {mid['plain loop'] / mid['wayfuse']:.1f} (medians)")
+    print(
+        f"ratio {ratio:.1f} (minima), {mid['plain loop'] / mid['wayfuse']:.1f} (medians), {len(paths)} files"
+    )
     return ratio
 
 
