@@ -5,7 +5,7 @@ UV_VERSION := 0.13.9
 VENV := .venv
 STAMP := $(VENV)/.wayfuse-setup
 WEB := src/wayfuse/service/web
-PAGE := $(WEB)/assets/lock.sha256.txt
+PAGE := $(WEB)/assets/built.sha256.txt
 
 .PHONY: setup web demo test test-fast check lint types imports cov results bench clean
 

@@ -188,3 +188,20 @@ def test_pushes_for_the_survey_need_a_token_and_a_platform(client: Any) -> None:
 def test_built_files_are_served_and_nothing_else(client: Any) -> None:
     for name in ("..%2fpage.js", "no.mjs", ".hidden.txt", "assets"):
         assert client.get(f"/web/assets/{name}").status_code == 404
+
+
+def test_the_map_library_is_sent_packed_and_once(client: Any) -> None:
+    path = "/web/assets/maplibre-gl.mjs"
+    plain = client.get(path, headers={"Accept-Encoding": "identity"})
+    if plain.status_code == 404:
+        pytest.skip("NOT BUILT: make web")
+    packed = client.get(path, headers={"Accept-Encoding": "gzip"})
+    assert "content-encoding" not in plain.headers
+    assert packed.headers["content-encoding"] == "gzip"
+    assert int(packed.headers["content-length"]) < int(plain.headers["content-length"]) / 2
+    assert packed.content == plain.content
+    assert packed.headers["cache-control"] == "no-cache"
+    again = client.get(path, headers={"Accept-Encoding": "gzip", "If-None-Match": packed.headers["etag"]})
+    assert (again.status_code, again.content) == (304, b"")
+    assert client.get("/").headers["cache-control"] == "no-store"
+    assert client.get("/").headers["content-security-policy"] == packed.headers["content-security-policy"]

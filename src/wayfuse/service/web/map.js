@@ -85,7 +85,7 @@ export class IndoorMap {
   follow([lon, lat]) {
     const at = this.map.project([lon, lat]);
     const { clientWidth: width, clientHeight: height } = this.map.getContainer();
-    const inside = at.x > 0.2 * width && at.x < 0.8 * width && at.y > 0.2 * height && at.y < 0.8 * height;
+    const inside = at.x > 0.12 * width && at.x < 0.88 * width && at.y > 0.12 * height && at.y < 0.88 * height;
     if (!inside) this.map.easeTo({ center: [lon, lat], duration: 400 });
   }
 

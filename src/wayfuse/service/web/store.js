@@ -5,6 +5,7 @@ import { Frame } from "/web/frames.js";
 
 const TRAIL = 240; // places kept of each track
 const QUIET_S = 30; // without a word a track is drawn pale
+const GONE_S = 900; // and then no longer; it can still be replayed
 
 const hasPlace = (p) => p.x !== null && p.state !== "initialising";
 const placeIn = ({ n, t, floor, x, y }) => ({ n, t, floor, x, y });
@@ -91,6 +92,7 @@ class Store extends EventTarget {
       this.ahead = p.heard - Date.now() / 1000;
       this.#place(p, data.changed);
     }
+    for (const [track, { p }] of this.tracks) if (track !== this.selected && this.now - p.heard > GONE_S) this.tracks.delete(track);
     this.tell("tracks");
   }
 

@@ -21,7 +21,8 @@ export function startTracks(view, map, replay) {
 
   const refresh = () => {
     const wanted = [...store.tracks.keys()].filter((t) => t.includes(find.value.trim().toLowerCase()));
-    const shown = wanted.slice(0, ROWS);
+    const isLate = (t) => Number(store.isQuiet(store.tracks.get(t).p));
+    const shown = wanted.sort((a, b) => isLate(a) - isLate(b)).slice(0, ROWS); // otherwise as they came
     const count = (state) => [...store.tracks.values()].filter(({ p }) => p.state === state && !store.isQuiet(p)).length;
     summary.textContent = store.tracks.size
       ? `${store.tracks.size} tracks: ${count("tracking")} tracking, ${count("initialising")} initialising, ${count("lost")} lost${wanted.length > ROWS ? `; the first ${ROWS} are listed` : ""}`
@@ -106,7 +107,10 @@ function startDetail(map, replay) {
   });
   cloud.addEventListener("change", () => drawParticles(map, cloud.checked));
   store.on("select tracks floor", fill);
-  store.on("select", () => drawParticles(map, cloud.checked));
+  store.on("select", () => {
+    drawParticles(map, cloud.checked);
+    if (store.selected) element.scrollIntoView({ block: "nearest" });
+  });
   store.on("floor", () => drawParticles(map, cloud.checked));
   ask(async () => {
     if (!store.selected) return;
