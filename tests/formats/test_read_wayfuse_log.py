@@ -13,7 +13,7 @@ from wayfuse.core.errors import FormatError
 from wayfuse.formats import reading
 from wayfuse.formats.wayfuse_log import read
 from wayfuse.sensors.recording import Device, Recording, Series
-from wayfuse.sensors.records import BleReading, CsiFrame, Range, Waypoint, WifiScan
+from wayfuse.sensors.records import BleReading, CsiFrame, Range, Step, Waypoint, WifiScan
 from wayfuse.simulator.wayfuse_log import write_wayfuse_log
 
 NUMBER = st.floats(width=64)
@@ -73,6 +73,7 @@ RECORDINGS = st.builds(
     wifi=ordered(scans()),
     ble=ordered(st.builds(BleReading, TIME, IDENTIFIER, NUMBER, NUMBER)),
     ranges=ordered(st.builds(Range, TIME, IDENTIFIER, NUMBER, NUMBER, NUMBER)),
+    steps=ordered(st.builds(Step, TIME, NUMBER, NUMBER)),
     csi=ordered(frames()),
     waypoints=ordered(st.builds(Waypoint, TIME, NUMBER, NUMBER, TEXT, NUMBER, NUMBER)),
     site=TEXT,

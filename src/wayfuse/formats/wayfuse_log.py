@@ -18,13 +18,20 @@ import numpy as np
 from wayfuse.core.errors import FormatError
 from wayfuse.sensors.quality import ReadReport
 from wayfuse.sensors.recording import Device, Recording, Series
-from wayfuse.sensors.records import BleReading, CsiFrame, Range, Waypoint, WifiScan, bssid_id
+from wayfuse.sensors.records import BleReading, CsiFrame, Range, Step, Waypoint, WifiScan, bssid_id
 
 __all__ = ["read"]
 
 _VERSION = 1
 _WIDTHS = {"acceleration": 3, "rotation_rate": 3, "magnetic_field": 3, "pressure": 1, "orientation": 4}
-_EVENTS = {"wifi": "wifi", "ble": "ble", "range": "ranges", "csi": "csi", "waypoint": "waypoints"}
+_EVENTS = {
+    "wifi": "wifi",
+    "ble": "ble",
+    "range": "ranges",
+    "step": "steps",
+    "csi": "csi",
+    "waypoint": "waypoints",
+}
 _NOT_FINITE = {None: float("nan"), "inf": float("inf"), "-inf": float("-inf")}
 _DIGEST = 1 << 63
 _LARGEST = 1 << 64
@@ -55,6 +62,7 @@ def read(path: str | Path) -> Recording:
         wifi=_ordered("wifi", events, report),
         ble=_ordered("ble", events, report),
         ranges=_ordered("range", events, report),
+        steps=_ordered("step", events, report),
         csi=_ordered("csi", events, report),
         waypoints=_ordered("waypoint", events, report),
         site=_text(head, "site"),
@@ -173,6 +181,11 @@ def _range(fields: list[Any]) -> Range:
     return Range(_time(t), _identifier(anchor), _number(distance), _number(sigma), _number(rssi))
 
 
+def _step(fields: list[Any]) -> Step:
+    t, length, heading = fields
+    return Step(_time(t), _number(length), _number(heading))
+
+
 def _csi(fields: list[Any]) -> CsiFrame:
     t, anchor, rss, agc, noise, shape, parts = fields
     if len(shape) != _CSI_AXES:
@@ -193,6 +206,7 @@ _MAKERS: Mapping[str, Callable[[list[Any]], Any]] = {
     "wifi": _wifi,
     "ble": _ble,
     "range": _range,
+    "step": _step,
     "csi": _csi,
     "waypoint": _waypoint,
 }

@@ -26,6 +26,7 @@ from wayfuse.sensors.records import (
     Range,
     Record,
     RotationRate,
+    Step,
     Waypoint,
     WifiScan,
 )
@@ -74,7 +75,8 @@ class Recording:
     """One walk of one phone.
 
     Series hold (x, y, z) except ``pressure`` (hPa) and ``orientation`` (w, x, y, z). ``floor`` is what the file says
-    of its floor (a surveyor's label: truth, never an input of a tracker). ``clock`` names the clock of ``t``.
+    of its floor (a surveyor's label: truth, never an input of a tracker). ``clock`` names the clock of ``t``. ``steps``
+    are those that the phone worked out itself.
     """
 
     name: str
@@ -86,6 +88,7 @@ class Recording:
     wifi: tuple[WifiScan, ...] = ()
     ble: tuple[BleReading, ...] = ()
     ranges: tuple[Range, ...] = ()
+    steps: tuple[Step, ...] = ()
     csi: tuple[CsiFrame, ...] = ()
     waypoints: tuple[Waypoint, ...] = ()
     site: str = ""
@@ -109,6 +112,16 @@ class Recording:
         """Whether there is no record at all."""
         return not any(len(s) for s in self._series()) and not any(self._events())
 
+    @property
+    def n_motion(self) -> int:
+        """Number of samples of the motion sensors."""
+        return sum(len(series) for series in self._series())
+
+    @property
+    def n_records(self) -> int:
+        """Number of records of all kinds."""
+        return self.n_motion + sum(len(events) for events in self._events())
+
     def records(self) -> Iterator[Record]:
         """All records in time order, merged lazily; at equal times motion sensors come before radio, truth last."""
         makers: tuple[tuple[Series, Callable[..., Record]], ...] = (
@@ -126,7 +139,7 @@ class Recording:
         return self.acceleration, self.rotation_rate, self.magnetic_field, self.pressure, self.orientation
 
     def _events(self) -> tuple[tuple[Record, ...], ...]:
-        return self.wifi, self.ble, self.ranges, self.csi, self.waypoints
+        return self.steps, self.wifi, self.ble, self.ranges, self.csi, self.waypoints
 
 
 def _rows(series: Series, make: Callable[..., Record]) -> Iterator[Record]:

@@ -25,6 +25,7 @@ __all__ = [
     "Range",
     "Record",
     "RotationRate",
+    "Step",
     "Waypoint",
     "WifiScan",
     "bssid_id",
@@ -139,6 +140,14 @@ class Range(NamedTuple):
     rssi: float = float("nan")
 
 
+class Step(NamedTuple):
+    """A step that the phone worked out itself: length (m, NaN unknown), heading (rad counter-clockwise from east)."""
+
+    t: float
+    length: float
+    heading: float
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class CsiFrame:
     """Channel state of one packet: (n_rx, n_tx, n_subcarriers) complex64, with RSS (dBm), AGC and noise (dBm)."""
@@ -174,6 +183,7 @@ Record: TypeAlias = (
     | WifiScan
     | BleReading
     | Range
+    | Step
     | CsiFrame
     | Waypoint
 )

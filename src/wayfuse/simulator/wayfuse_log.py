@@ -33,6 +33,7 @@ from wayfuse.sensors.records import (
     Range,
     Record,
     RotationRate,
+    Step,
     Waypoint,
     WifiScan,
     bssid_text,
@@ -50,6 +51,7 @@ _KINDS: dict[type[Any], str] = {
     WifiScan: "wifi",
     BleReading: "ble",
     Range: "range",
+    Step: "step",
     CsiFrame: "csi",
     Waypoint: "waypoint",
 }

@@ -14,16 +14,16 @@ import heapq
 import math
 from collections import Counter
 from dataclasses import dataclass, field, replace
-from typing import Generic, NamedTuple, TypeVar
+from typing import Generic, TypeVar
 
 import numpy as np
 
+from wayfuse.core.angles import wrap
 from wayfuse.core.errors import ConfigError, UsageError
-from wayfuse.core.types import Array
-from wayfuse.inertial.front_end import FrontEndState, InertialFrontEnd, StepEvent
+from wayfuse.inertial.front_end import InertialFrontEnd, StepEvent
 from wayfuse.inertial.vertical import VerticalEvent
-from wayfuse.inertial.vertical_front_end import VerticalFrontEnd, VerticalState
-from wayfuse.radio.scans import ScanBuffer, ScanState
+from wayfuse.inertial.vertical_front_end import VerticalFrontEnd
+from wayfuse.radio.scans import ScanBuffer
 from wayfuse.sensors.quality import Verdict
 from wayfuse.sensors.recording import Recording
 from wayfuse.sensors.records import (
@@ -34,57 +34,26 @@ from wayfuse.sensors.records import (
     Range,
     Record,
     RotationRate,
+    Step,
     Waypoint,
     WifiScan,
 )
 from wayfuse.tracking.engine import Engine, Known
 from wayfuse.tracking.estimate import Estimate
+from wayfuse.tracking.track_state import FAR, LONGEST_GAP, Batch, Replay, Track, TrackState, is_even
 
-__all__ = ["Track", "TrackState", "Tracker"]
+__all__ = ["Batch", "Track", "TrackState", "Tracker"]
 
 S = TypeVar("S")
 
 _MOTION = (Acceleration, RotationRate, MagneticField, Orientation, Pressure)
 _QUIET_AFTER = 2.0  # s without motion sensors until a method diffuses (a standing phone still reports)
-_LONGEST_GAP = 300.0  # s; after a longer silence the track starts anew: the person can be anywhere
+_USUAL_STEP, _LONGEST_STEP, _USUAL_DURATION = (
+    0.7,
+    2.5,
+    0.55,
+)  # m, m, s: of steps that a phone worked out itself
 _LONGEST_RANGE = 1e3  # m; no radio ranges further indoors
-_FAR = 1e12  # s; times beyond are no times: float64 no longer tells milliseconds apart
-
-
-class TrackState(NamedTuple, Generic[S]):
-    """Everything a track needs to go on; a value: keep it and it is a checkpoint."""
-
-    name: str
-    seed: int
-    front_end: FrontEndState
-    vertical: VerticalState
-    scans: ScanState
-    engine: S
-    now: float = -np.inf
-    next_output: float = np.inf
-    last_heard: float = np.inf
-    last_motion: float = -np.inf
-    diffused: float = -np.inf
-    pending: tuple[float, ...] = ()
-    ranges: tuple[Range, ...] = ()  # of the present moment, which may not be over
-
-
-class _Replay(NamedTuple):
-    """What `step` sees record by record, for a recording that is at hand whole: (n,) s, acceleration times."""
-
-    motion: Array
-
-    def last_motion(self, t: float) -> float:
-        i = int(np.searchsorted(self.motion, t, side="right"))
-        return float(self.motion[i - 1]) if i else -np.inf
-
-
-class Track(NamedTuple):
-    """A finished track: its estimates in time order, and what became of the records."""
-
-    name: str
-    estimates: list[Estimate]
-    verdicts: Counter[Verdict]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -130,16 +99,16 @@ class Tracker(Generic[S]):
             return state, [], Verdict.IGNORED
         if not np.isfinite(record.t):
             return state, [], Verdict.NOT_FINITE
-        if abs(record.t) > _FAR:
+        if abs(record.t) > FAR:
             return state, [], Verdict.OUT_OF_RANGE
         if record.t < state.now:
             return state, [], Verdict.LATE
         out: list[Estimate] = []
         if state.ranges and record.t > state.ranges[0].t:
             state = self._ranges(state, out)
-        is_heard = isinstance(record, Acceleration | WifiScan | Range)
-        is_paused = state.now > -np.inf and record.t - state.now > _LONGEST_GAP
-        if is_paused or (is_heard and record.t - state.last_heard > _LONGEST_GAP):
+        is_heard = isinstance(record, Acceleration | WifiScan | Range | Step)
+        is_paused = state.now > -np.inf and record.t - state.now > LONGEST_GAP
+        if is_paused or (is_heard and record.t - state.last_heard > LONGEST_GAP):
             state = self._restart(state, record.t, out)
         if is_heard:
             state = state._replace(last_heard=record.t)
@@ -150,6 +119,8 @@ class Tracker(Generic[S]):
         if isinstance(record, Range):
             state, verdict = self._range(state, record)
             return state, out, verdict
+        if isinstance(record, Step):
+            return self._told(state, record, out)
         if not isinstance(record, _MOTION):
             return state, out, Verdict.IGNORED  # BLE, channel state: no model yet
         front_end, event = self.front_end.step(state.front_end, record)
@@ -175,6 +146,25 @@ class Tracker(Generic[S]):
         state = state._replace(vertical=vertical)
         return state if said is None else self._vertical_event(state, said, out)
 
+    def _told(
+        self, state: TrackState[S], record: Step, out: list[Estimate]
+    ) -> tuple[TrackState[S], list[Estimate], Verdict]:
+        """Take a step that the phone worked out itself."""
+        if not math.isfinite(record.heading) or math.isinf(record.length):
+            return state, out, Verdict.NOT_FINITE
+        if not 0.0 <= record.length <= _LONGEST_STEP and math.isfinite(record.length):
+            return state, out, Verdict.OUT_OF_RANGE
+        length = record.length if math.isfinite(record.length) else _USUAL_STEP
+        event = StepEvent(
+            record.t, length, float(wrap(record.heading)), _USUAL_DURATION, 0.0, 0.0, 0.0, 0.0, 1.0
+        )
+        state = self._step_event(state._replace(last_motion=record.t, is_told=True), event, out)
+        if self.engine.uses_vertical:
+            vertical, said = self.vertical.on_step(state.vertical, event)
+            state = state._replace(vertical=vertical)
+            state = state if said is None else self._vertical_event(state, said, out)
+        return state, out, Verdict.USED
+
     def flush(self, state: TrackState[S], until: float) -> tuple[TrackState[S], list[Estimate]]:
         """The estimates still due up to a time, and those that wait for their lag."""
         out: list[Estimate] = []
@@ -183,17 +173,24 @@ class Tracker(Generic[S]):
 
     def run(self, recording: Recording, seed: int = 0) -> Track:
         """Replay a recording: the same bits as `step` over its records and `flush` at its end."""
+        if replace(recording, waypoints=()).is_empty:
+            return Track(recording.name, [], Counter())
+        state, out, scans, _ = self.extend(self.init(recording.name, seed), recording)
+        return Track(recording.name, out + self.flush(state, state.now)[1], scans)
+
+    def extend(self, state: TrackState[S], recording: Recording) -> Batch[S]:
+        """Take the records of a recording as a batch: the same bits as `step` over them, in less time."""
         recording = replace(recording, waypoints=())
-        state = self.init(recording.name, seed)
-        out: list[Estimate] = []
-        verdicts: Counter[Verdict] = Counter()
         if recording.is_empty:
-            return Track(recording.name, out, verdicts)
-        # ranges are few; the array path is for what is many
-        if (recording.ranges and self.engine.uses_ranges) or _has_breaks(recording):
-            return self._run_by_record(recording, state)
+            return Batch(state, [], Counter(), Counter())
+        # ranges and steps are few; the array path is for what is many
+        few = recording.steps or (self.engine.uses_ranges and (recording.ranges or state.ranges))
+        if few or not is_even(state, recording):
+            return self._extend_by_record(state, recording)
+        out: list[Estimate] = []
+        scans: Counter[Verdict] = Counter()
         start, end = recording.span
-        replay = _Replay(recording.acceleration.t)
+        replay = Replay(recording.acceleration.t, state.last_motion)
         state = self._advance(state, start, out, replay)
         done = -np.inf
         for scan in recording.wifi:
@@ -201,27 +198,31 @@ class Tracker(Generic[S]):
             done = scan.t
             state = self._advance(state, scan.t, out, replay)
             state, verdict = self._scan(state, scan, out)
-            verdicts[verdict] += 1
+            scans[verdict] += 1
         state = self._steps(state, recording, replay, (done, end), out)
         state = self._advance(state, end, out, replay)
-        self._finish(state, end, out, replay)
-        return Track(recording.name, out, verdicts)
+        heard = [float(t[-1]) for t in (recording.acceleration.t, [s.t for s in recording.wifi]) if len(t)]
+        if heard:
+            state = state._replace(last_heard=max(heard))
+        n_motion, n_other = recording.n_motion, recording.n_records - len(recording.wifi)
+        others = Counter({Verdict.USED: n_motion, Verdict.IGNORED: n_other - n_motion})
+        return Batch(state, out, scans, +others)
 
-    def _run_by_record(self, recording: Recording, state: TrackState[S]) -> Track:
+    def _extend_by_record(self, state: TrackState[S], recording: Recording) -> Batch[S]:
         out: list[Estimate] = []
-        verdicts: Counter[Verdict] = Counter()
+        scans: Counter[Verdict] = Counter()
+        others: Counter[Verdict] = Counter()
         for record in recording.records():
             state, said, verdict = self.step(state, record)
             out += said
-            if isinstance(record, WifiScan):
-                verdicts[verdict] += 1
-        return Track(recording.name, out + self.flush(state, state.now)[1], verdicts)
+            (scans if isinstance(record, WifiScan) else others)[verdict] += 1
+        return Batch(state, out, scans, others)
 
     def _steps(
         self,
         state: TrackState[S],
         recording: Recording,
-        replay: _Replay,
+        replay: Replay,
         within: tuple[float, float],
         out: list[Estimate],
     ) -> TrackState[S]:
@@ -246,7 +247,7 @@ class Tracker(Generic[S]):
         return state
 
     def _advance(
-        self, state: TrackState[S], t: float, out: list[Estimate], replay: _Replay | None
+        self, state: TrackState[S], t: float, out: list[Estimate], replay: Replay | None
     ) -> TrackState[S]:
         """Let time pass to t: what is due before t, then t itself."""
         if state.now == -np.inf:
@@ -255,7 +256,7 @@ class Tracker(Generic[S]):
         return self._heard(state._replace(now=t), t, replay)
 
     def _pass(
-        self, state: TrackState[S], t: float, out: list[Estimate], replay: _Replay | None
+        self, state: TrackState[S], t: float, out: list[Estimate], replay: Replay | None
     ) -> TrackState[S]:
         """The outputs due before t, and the estimates whose lag is over before t, in time order."""
         while True:
@@ -284,11 +285,11 @@ class Tracker(Generic[S]):
         )
 
     @staticmethod
-    def _heard(state: TrackState[S], t: float, replay: _Replay | None) -> TrackState[S]:
+    def _heard(state: TrackState[S], t: float, replay: Replay | None) -> TrackState[S]:
         return state if replay is None else state._replace(last_motion=replay.last_motion(t))
 
     def _finish(
-        self, state: TrackState[S], until: float, out: list[Estimate], replay: _Replay | None
+        self, state: TrackState[S], until: float, out: list[Estimate], replay: Replay | None
     ) -> TrackState[S]:
         state = self._pass(state, np.nextafter(until, np.inf), out, replay)
         if self.engine.uses_vertical and math.isfinite(until):
@@ -356,7 +357,8 @@ class Tracker(Generic[S]):
 
     def _known(self, state: TrackState[S]) -> Known:
         return Known(
-            state.front_end.is_heading_absolute, math.isfinite(self.vertical.altitude(state.vertical))
+            state.is_told or state.front_end.is_heading_absolute,
+            math.isfinite(self.vertical.altitude(state.vertical)),
         )
 
     def _diffuse(self, state: TrackState[S], t: float) -> TrackState[S]:
@@ -382,12 +384,3 @@ class Tracker(Generic[S]):
 
 def _time(event: StepEvent | VerticalEvent) -> float:
     return event.t
-
-
-def _has_breaks(recording: Recording) -> bool:
-    """Whether times are so far apart, or so odd, that a track of the recording is best fed record by record."""
-    heard = np.concatenate([recording.acceleration.t, [scan.t for scan in recording.wifi]])
-    start, end = recording.span
-    inside = np.concatenate([np.sort(heard), [end]])
-    gaps = np.diff(inside, prepend=start)
-    return not (start >= -_FAR and end <= _FAR and bool(np.all(gaps <= _LONGEST_GAP)))
