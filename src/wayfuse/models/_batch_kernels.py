@@ -51,7 +51,7 @@ def tick(
     steps (K, 2): length m, heading rad; a length of 0 or less = no step. numbers (7,): the four sigmas of `pdr_move`,
     the penalty of a blocked move (nats), the share of N below which the effective sample size makes it resample, the
     precision of `add_ranges`. grid .. walls: `WallArrays`; moves are not tested where ``walls`` is empty. anchors
-    (A, 2), ranges (K, A): see `add_ranges`; levels, frame, scans (K, 2, P): `add_levels`; places (K, k, 4):
+    (A, 2), ranges (K, A): see `add_ranges`; levels, frame, scans (K, C, 2, 16): `add_levels`; places (K, k, 4):
     `add_places`; an axis of length 0 = there are none. out (K, 8): mean x, y, covariance xx, xy, yy, effective sample
     size, log of the mean weight, and 1 where it resampled.
     """
@@ -81,7 +81,7 @@ def tick(
             _copy(old, block)
         if ranges.shape[1] > 0:
             add_ranges(block[0], block[1], anchors, ranges[k], numbers[6], logs)
-        if scans.shape[2] > 0:
+        if scans.shape[1] > 0:
             add_levels(block[0], block[1], levels, frame, scans[k], logs)
         if places.shape[1] > 0:
             add_places(block[0], block[1], places[k], logs)

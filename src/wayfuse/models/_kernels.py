@@ -160,29 +160,36 @@ def add_ranges(
 def add_levels(x: Array32, y: Array32, levels: Array32, frame: Array32, scan: Array32, out: Array32) -> None:
     """Add sum_a h_a (log s_a - (z_a - m_a)² s_a² / 2) to ``out`` (N,): Gaussian readings on a grid, read bilinearly.
 
-    levels (nodes, 3, P): m dBm, s = 1 / sigma 1/dB, log s of P access points, padded to a multiple of 16; frame (5,):
-    x, y m of node 0, 1 / step 1/m, nodes per row, rows; scan (2, P): z dBm, h = 1 where heard, else 0.
+    levels (C, nodes, 3, 16): m dBm, s = 1 / sigma 1/dB, log s of 16 C access points; frame (5,): x, y m of node 0,
+    1 / step 1/m, nodes per row, rows; scan (C, 2, 16): z dBm, h = 1 where heard, else 0.
     """
-    columns, rows = int(frame[3]), int(frame[4])
-    p = scan.shape[1]
-    half = np.float32(0.5)
-    for i in range(len(x)):
-        u = min(max((x[i] - frame[0]) * frame[2], np.float32(0.0)), np.float32(columns - 1.001))
-        v = min(max((y[i] - frame[1]) * frame[2], np.float32(0.0)), np.float32(rows - 1.001))
-        j, k = int(u), int(v)
-        fu, fv = u - np.float32(j), v - np.float32(k)
-        a, b = levels[k * columns + j], levels[k * columns + j + 1]
-        c, d = levels[(k + 1) * columns + j], levels[(k + 1) * columns + j + 1]
-        wa, wb = (np.float32(1.0) - fu) * (np.float32(1.0) - fv), fu * (np.float32(1.0) - fv)
-        wc, wd = (np.float32(1.0) - fu) * fv, fu * fv
-        total = np.float32(0.0)
-        for q in range(p):
-            m = wa * a[0, q] + wb * b[0, q] + wc * c[0, q] + wd * d[0, q]
-            s = wa * a[1, q] + wb * b[1, q] + wc * c[1, q] + wd * d[1, q]
-            g = wa * a[2, q] + wb * b[2, q] + wc * c[2, q] + wd * d[2, q]
-            e = (scan[0, q] - m) * s
-            total += scan[1, q] * (g - half * e * e)
-        out[i] += total
+    n, columns = len(x), int(frame[3])
+    one, half = np.float32(1.0), np.float32(0.5)
+    most_u, most_v = frame[3] - np.float32(1.001), frame[4] - np.float32(1.001)
+    node, part_u, part_v = np.empty(n, np.int32), np.empty(n, np.float32), np.empty(n, np.float32)
+    for i in range(n):
+        u = min(max((x[i] - frame[0]) * frame[2], np.float32(0.0)), most_u)
+        v = min(max((y[i] - frame[1]) * frame[2], np.float32(0.0)), most_v)
+        node[i] = np.int32(v) * np.int32(columns) + np.int32(u)
+        part_u[i] = u - np.float32(np.int32(u))
+        part_v[i] = v - np.float32(np.int32(v))
+    for c in range(len(levels)):
+        table, z, h = levels[c], scan[c, 0], scan[c, 1]
+        for i in range(n):
+            fu, fv = part_u[i], part_v[i]
+            wa, wb, wc, wd = (one - fu) * (one - fv), fu * (one - fv), (one - fu) * fv, fu * fv
+            low = np.uint32(node[i])
+            high = low + np.uint32(columns)
+            a, b = table[low], table[low + np.uint32(1)]
+            d, e = table[high], table[high + np.uint32(1)]
+            total = np.float32(0.0)
+            for q in range(16):  # a whole vector
+                m = wa * a[0, q] + wb * b[0, q] + wc * d[0, q] + wd * e[0, q]
+                s = wa * a[1, q] + wb * b[1, q] + wc * d[1, q] + wd * e[1, q]
+                g = wa * a[2, q] + wb * b[2, q] + wc * d[2, q] + wd * e[2, q]
+                r = (z[q] - m) * s
+                total += h[q] * (g - half * r * r)
+            out[i] += total
 
 
 @fast_kernel

@@ -23,13 +23,15 @@ from wayfuse.filters.cloud import Cloud
 from wayfuse.maps.walls import WallArrays, WallIndex
 from wayfuse.models._batch_kernels import tick
 from wayfuse.models.motion.pdr import PdrMotion
-from wayfuse.radio.level_table import LevelTable
+from wayfuse.radio.level_table import LANES, LevelTable
 
 __all__ = ["BatchModel", "Seen", "TrackBatch"]
 
 _NO_ANCHORS = np.zeros((0, 2), np.float32)
-_NO_LEVELS = LevelTable(np.zeros((4, 3, 0), np.float32), np.array([0, 0, 1, 2, 2], np.float32), 0)
-_NO_RANGES, _NO_SCANS, _NO_PLACES = (np.zeros(shape, np.float32) for shape in ((1, 0), (1, 2, 0), (1, 0, 4)))
+_NO_LEVELS = LevelTable(np.zeros((0, 4, 3, LANES), np.float32), np.array([0, 0, 1, 2, 2], np.float32), 0)
+_NO_RANGES, _NO_SCANS, _NO_PLACES = (
+    np.zeros(shape, np.float32) for shape in ((1, 0), (1, 0, 2, LANES), (1, 0, 4))
+)
 
 
 class Seen(NamedTuple):

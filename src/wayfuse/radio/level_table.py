@@ -3,10 +3,10 @@ r"""Expected levels on a grid, laid out for kernels: Gaussian readings whose mea
 .. math:: \log p(z \mid x) = \sum_{a\,\text{heard}} \log s_a(x) - \tfrac12 s_a(x)^2 (z_a - m_a(x))^2, \quad s = 1/\sigma
 
 Between nodes m, s and log s are interpolated. What is stored is 1/sigma and its logarithm, not sigma: the query then
-needs no division and no logarithm. Access points are padded to a multiple of 16, so that a row fills whole vectors.
+needs no division and no logarithm. Access points come in groups of 16, the last one padded: a group is a whole vector.
 
 >>> table = LevelTable.of((0.0, 0.0), 1.0, np.full((2, 2, 1), -60.0), np.full((2, 2, 1), 4.0))
->>> table.scans(np.array([[np.nan]]))[0, 1].sum()
+>>> table.scans(np.array([[np.nan]]))[0, 0, 1].sum()
 np.float32(0.0)
 """
 
@@ -27,9 +27,9 @@ LANES = 16  # float32 numbers of the widest vectors in use
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LevelTable:
-    """Levels (nodes, 3, P): mean dBm, 1 / sigma 1/dB, log(1 / sigma); frame (5,): see `models._kernels.add_levels`.
+    """Levels (groups, nodes, 3, 16): mean dBm, 1 / sigma 1/dB, log(1 / sigma) of the access points of each group.
 
-    n_aps : access points; the columns from there to P are padding.
+    frame (5,): x, y m of the first node, 1 / step 1/m, nodes per row, rows. n_aps : access points; the rest is padding.
     """
 
     levels: Array32
@@ -61,14 +61,18 @@ class LevelTable:
         ):
             raise ConfigError("step and sigma must be positive, all levels finite", where="LevelTable")
         rows, columns, n = mean.shape
-        levels = np.zeros((rows * columns, 3, -(-n // LANES) * LANES), np.float32)
+        groups = -(-n // LANES)
+        levels = np.zeros((rows * columns, 3, groups * LANES), np.float32)
         levels[:, 0, :n] = mean.reshape(-1, n)
         levels[:, 1, :n] = 1.0 / sigma.reshape(-1, n)
         levels[:, 2, :n] = -np.log(sigma.reshape(-1, n))
-        return cls(levels, np.array([*origin, 1.0 / step, columns, rows], np.float32), n)
+        grouped = levels.reshape(rows * columns, 3, groups, LANES).transpose(2, 0, 1, 3)
+        return cls(
+            np.ascontiguousarray(grouped), np.array([*origin, 1.0 / step, columns, rows], np.float32), n
+        )
 
     def scans(self, rssi: NDArray[np.floating]) -> Array32:
-        """(K, 2, P) readings and 1 where heard, of scans (K, a) dBm with NaN where unheard.
+        """(K, groups, 2, 16) readings and 1 where heard, of scans (K, a) dBm with NaN where unheard.
 
         Raises
         ------
@@ -77,7 +81,8 @@ class LevelTable:
         if rssi.ndim != 2 or rssi.shape[1] != self.n_aps:
             raise UsageError(f"scans of shape {rssi.shape}", remedy=f"(K, {self.n_aps}) dBm")
         heard = np.isfinite(rssi)
-        out = np.zeros((len(rssi), 2, self.levels.shape[2]), np.float32)
+        groups = len(self.levels)
+        out = np.zeros((len(rssi), 2, groups * LANES), np.float32)
         out[:, 0, : self.n_aps] = np.where(heard, rssi, 0.0)
         out[:, 1, : self.n_aps] = heard
-        return out
+        return np.ascontiguousarray(out.reshape(-1, 2, groups, LANES).transpose(0, 2, 1, 3))
