@@ -42,6 +42,8 @@ export function age(seconds) {
   return `${Math.floor(seconds / size)} ${unit}`;
 }
 
+export const ago = (seconds) => (seconds < 2 ? "just now" : `${age(seconds)} ago`);
+
 /** A control that runs `work` when pressed, is busy meanwhile, and says what went wrong. */
 export function action(text, work, props = {}) {
   const said = el("span", { role: "status", className: "said" });

@@ -53,11 +53,11 @@ const LAYERS = [
     paint: () => ({ "circle-radius": zoomed(17, 1.2, 21, 2.6), "circle-color": ["get", "colour"], "circle-opacity": ["get", "opacity"] }),
   },
   {
-    id: "walked", type: "line", source: "points", layout: { "line-cap": "round" },
+    id: "walked", type: "line", source: "points", filter: kind("way"), layout: { "line-cap": "round" },
     paint: (p) => ({ "line-color": p.point, "line-width": 2, "line-dasharray": [2, 2] }),
   },
   {
-    id: "points", type: "circle", source: "points",
+    id: "points", type: "circle", source: "points", filter: kind("tap"),
     paint: (p) => ({ "circle-radius": 5, "circle-color": p.point, "circle-stroke-color": p.halo, "circle-stroke-width": 1.5 }),
   },
   {

@@ -1,7 +1,7 @@
 // Survey tools: record, upload, build, look, publish.
 
 import { get, post, remove } from "/web/api.js";
-import { action, age, el, metres, percent } from "/web/dom.js";
+import { action, ago, el, metres, percent } from "/web/dom.js";
 import { collection, feature } from "/web/frames.js";
 import { store } from "/web/store.js";
 import { startPictures } from "/web/survey_pictures.js";
@@ -21,8 +21,10 @@ export function startSurvey(view, map) {
     const all = [...last.walks.map((w) => w.taps), pending];
     const here = all.map((of) => of.filter((tap) => tap.floor === store.floor)).filter((of) => of.length);
     const { frame } = store.floors[store.floor];
-    const shape = (of) => (of.length > 1 ? { type: "LineString", coordinates: of.map((t) => frame.degrees(t.x, t.y)) } : frame.point(of[0].x, of[0].y));
-    map.data("points", collection(here.map((of) => feature(shape(of)))));
+    const places = here.map((of) => of.map((t) => frame.degrees(t.x, t.y)));
+    const lines = places.filter((of) => of.length > 1).map((of) => feature({ type: "LineString", coordinates: of }, { kind: "way" }));
+    const spots = places.flat().map((place) => feature({ type: "Point", coordinates: place }, { kind: "tap" }));
+    map.data("points", collection([...lines, ...spots]));
   };
   const ask = async () => {
     last = await get("/api/v1/survey", { site: store.site });
@@ -92,7 +94,7 @@ function startParts(ask) {
     shown = now;
     summary.textContent = `${walks.length} walks by hand, ${recordings.length} recordings`;
     list.replaceChildren(
-      ...walks.map((w) => el("li", {}, `Level ${store.floors[w.taps[0].floor]?.level}: ${w.taps.length} taps, ${Math.round(w.taps.at(-1).t - w.taps[0].t)} s, ${age(store.now - w.taps[0].t)} ago`, drop(w.id))),
+      ...walks.map((w) => el("li", {}, `Level ${store.floors[w.taps[0].floor]?.level}: ${w.taps.length} taps, ${Math.round(w.taps.at(-1).t - w.taps[0].t)} s, ${ago(store.now - w.taps[0].t)}`, drop(w.id))),
       ...recordings.map((r) => el("li", {}, r.name, drop(r.id))));
   };
   return { element, take };
@@ -122,7 +124,7 @@ function startBuilder(ask, built) {
     if (shown === `${job.site} ${job.id}`) return;
     shown = `${job.site} ${job.id}`;
     const { version, fingerprints, access_points: aps, walks, notes, rooms: found } = job.result;
-    said.textContent = `Version ${version}: ${fingerprints} fingerprints of ${aps} access points from ${walks} walks. Publish it below to put it to use.${notes.length ? ` ${notes.join("; ")}.` : ""}${found.length ? " Errors of its own fingerprints, found by the other walks:" : " Two walks that overlap would tell how accurate it is."}`;
+    said.textContent = `Version ${version}: ${fingerprints} fingerprints of ${aps} access points from ${walks} walks. Publish it below to put it to use.${notes.length ? ` ${notes.join("; ")}.` : ""}${found.length ? " Errors of its fingerprints, each found by the other walks; a place that one walk alone has seen is found elsewhere:" : " Two walks of the same places would tell how accurate it is."}`;
     table.hidden = !found.length;
     const error = (value) => (value === null ? "wrong floor" : metres(value));
     rooms.replaceChildren(...found.map((r) => row(r.level, r.name || "(no room)", r.n, error(r.median), error(r.p90), percent(r.right_floor))));
@@ -143,7 +145,7 @@ function startVersions(changed) {
         await list();
         await changed();
       });
-      const made = row(v.version, `${v.note || "no note"}, ${age(store.now - v.created)} ago`, "");
+      const made = row(v.version, `${v.note || "no note"}, ${ago(store.now - v.created)}`, "");
       made.lastChild.append(v.version === published ? "in use" : publish());
       return made;
     }));

@@ -6,7 +6,7 @@ import { collection, feature } from "/web/frames.js";
 import { RAMPS, hideGrid, showGrid } from "/web/grid.js";
 import { store } from "/web/store.js";
 
-const CHOICES = { none: "Nothing", coverage: "Coverage, and where to survey next", heat: "Level of an access point" };
+const CHOICES = { none: "Nothing", coverage: "Coverage: where to survey next", heat: "Level of one access point" };
 
 export function startPictures(map) {
   const said = el("p", { className: "small", role: "status" });

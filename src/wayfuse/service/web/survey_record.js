@@ -1,7 +1,7 @@
 // Recording by hand: a phone pushes its scans, a person presses on the map where it stands or turns.
 
 import { post } from "/web/api.js";
-import { action, age, el } from "/web/dom.js";
+import { action, ago, el } from "/web/dom.js";
 import { store } from "/web/store.js";
 
 const HERE_S = 20; // a phone heard within this pushes now
@@ -83,7 +83,7 @@ export function startRecord(map, changed, draw) {
     phones = survey.phones;
     const kept = phone.value;
     const rows = phones.map((p) => el("option", { value: p.device, textContent:
-      `${p.device.slice(0, 6)}: ${p.scans} scans, ${survey.now - p.heard < HERE_S ? "pushing" : `last ${age(survey.now - p.heard)} ago`}` }));
+      `${p.device.slice(0, 6)}: ${p.scans} scans, ${survey.now - p.heard < HERE_S ? "pushing" : `last ${ago(survey.now - p.heard)}`}` }));
     phone.replaceChildren(...(rows.length ? rows : [el("option", { value: "", textContent: "None yet: give one the address below" })]));
     if (phones.some((p) => p.device === kept)) phone.value = kept;
     stand.disabled = walk.disabled = !phones.length;
