@@ -15,52 +15,24 @@ from bisect import bisect_right
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from operator import itemgetter
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from wayfuse.core.errors import ConfigError
-from wayfuse.sensors.records import (
-    Acceleration,
-    BleReading,
-    CsiFrame,
-    MagneticField,
-    Orientation,
-    Pressure,
-    Range,
-    Record,
-    RotationRate,
-    WifiScan,
-)
+from wayfuse.sensors.recording import Recording
+from wayfuse.sensors.records import Record
 from wayfuse.service.message import Message
 from wayfuse.service.phone_clock import ClockState, judge
+from wayfuse.service.stretch import RANK, START, Key, Keyed, gathered, joined, keyed
 from wayfuse.tracking.estimate import Estimate
 from wayfuse.tracking.tracker import Tracker, TrackState
 
 __all__ = ["LiveConfig", "LiveTrack", "Memory", "Snapshot"]
 
-# at equal times the order of `Recording.records`
-_RANK: dict[type, int] = {
-    kind: n
-    for n, kind in enumerate(
-        (
-            Acceleration,
-            RotationRate,
-            MagneticField,
-            Pressure,
-            Orientation,
-            WifiScan,
-            BleReading,
-            Range,
-            CsiFrame,
-        )
-    )
-}
 _FAR = 1e12  # s; as the tracker judges
-Key = tuple[float, int]
-Keyed = tuple[Key, Record]
-_START: Key = (-np.inf, -1)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -98,7 +70,7 @@ class Memory(NamedTuple):
     seed: int
     clock: ClockState
     base: Snapshot
-    records: tuple[Record, ...]
+    records: Recording
     kept: tuple[int, ...]
     last_settled: Estimate | None
     counts: dict[str, int]
@@ -117,9 +89,9 @@ class LiveTrack:
         self._clock = ClockState()
         self._state = tracker.init(name, seed)
         self._verdicts: Counter[str] = Counter()
-        self._last = _START
-        self._records: list[Keyed] = []  # since the oldest snapshot
-        self._snapshots = [Snapshot(_START, 0, 0, {}, self._state)]
+        self._last = START
+        self._stretches: list[Recording] = []  # since the oldest snapshot, cut where a state is kept
+        self._snapshots = [Snapshot(START, 0, 0, {}, self._state)]
         self._first = 0  # number of the first estimate still here
         self._estimates: list[Estimate] = []
         self._tail: list[Estimate] = []
@@ -217,7 +189,7 @@ class LiveTrack:
         if judged.is_set:
             self._begin_anew()
         kept = np.flatnonzero(sound)[judged.kept].tolist()
-        keyed = sorted(((records[i].t, _RANK[type(records[i])]), n) for n, i in enumerate(kept))
+        keyed = sorted(((records[i].t, RANK[type(records[i])]), n) for n, i in enumerate(kept))
         batch = [(key, records[kept[n]]) for key, n in keyed]
         base = self._snapshots[0].last
         fresh = [each for each in batch if each[0] >= base]
@@ -227,8 +199,7 @@ class LiveTrack:
             return changed
         if fresh[0][0] < self._last:
             changed, fresh = self._rewind(fresh)
-        for each in fresh:
-            self._step(*each)
+        self._go_on(fresh)
         return changed
 
     def _begin_anew(self) -> None:
@@ -236,17 +207,20 @@ class LiveTrack:
         self.counts["clock set"] += 1
         state = self._tracker.init(f"{self.name}#{self._clock.epoch}", self.seed)
         n = self._first + len(self._estimates)
-        total = self._snapshots[0].n_records + len(self._records)
-        self._records, self._state, self._last = [], state, _START
-        self._snapshots = [Snapshot(_START, total, n, dict(self._verdicts), state)]
+        total = self._n_records()
+        self._stretches, self._state, self._last = [], state, START
+        self._snapshots = [Snapshot(START, total, n, dict(self._verdicts), state)]
 
     def _rewind(self, fresh: list[Keyed]) -> tuple[int, list[Keyed]]:
         """Go back before the first of the records; the number of the first estimate undone, and what is to do again."""
         at = bisect_right(self._snapshots, fresh[0][0], key=itemgetter(0)) - 1
         back = self._snapshots[at]
         del self._snapshots[at + 1 :]
-        again = self._records[back.n_records - self._snapshots[0].n_records :]
-        del self._records[back.n_records - self._snapshots[0].n_records :]
+        n, undone = self._n_records() - back.n_records, list[Recording]()
+        while n:
+            undone.insert(0, self._stretches.pop())
+            n -= undone[0].n_records
+        again = keyed(joined(undone).records())
         del self._estimates[back.n_estimates - self._first :]
         self.counts["rewinds"] += 1
         self.counts["records done again"] += len(again)
@@ -257,27 +231,51 @@ class LiveTrack:
         # stable: at equal keys those that were here first
         return back.n_estimates, sorted(again + fresh, key=itemgetter(0))
 
-    def _step(self, key: Key, record: Record) -> None:
-        last = self._snapshots[-1].last
-        if key[0] - last[0] >= self._config.spacing and self._last != last:
-            self._keep()
-        if key[0] - self._last[0] > self._config.gap and self._last != _START:
-            self._verdicts["gaps"] += 1
-        self._state, said, verdict = self._tracker.step(self._state, record)
-        self._verdicts[verdict.value] += 1
+    def _go_on(self, fresh: list[Keyed]) -> None:
+        """Take records in order, in stretches between which the state is kept."""
+        start = 0
+        while start < len(fresh):
+            before = self._snapshots[-1].last
+            if fresh[start][0][0] - before[0] >= self._config.spacing and self._last != before:
+                self._keep()
+            base, stop = self._snapshots[-1].last[0], start + 1
+            while stop < len(fresh) and fresh[stop][0][0] - base < self._config.spacing:
+                stop += 1
+            self._take_stretch(fresh[start:stop])
+            start = stop
+
+    def _take_stretch(self, stretch: list[Keyed]) -> None:
+        times = [key[0] for key, _ in stretch]
+        before = times[0] if self._last == START else self._last[0]
+        gaps = sum(b - a > self._config.gap for a, b in pairwise([before, *times]))
+        if gaps:
+            self._verdicts["gaps"] += gaps
+        records = gathered(stretch)
+        self._state, said, scans, others = self._tracker.extend(self._state, records)
+        for verdict, n in (*scans.items(), *others.items()):
+            self._verdicts[verdict.value] += n
         self._estimates += said
-        self._records.append((key, record))
-        self._last = key
+        self._stretches.append(records)
+        self._last = stretch[-1][0]
+
+    def _n_records(self) -> int:
+        return self._snapshots[0].n_records + sum(r.n_records for r in self._stretches)
+
+    def _mark(self) -> None:
+        """Keep a way back here."""
+        done = self._first + len(self._estimates)
+        self._snapshots.append(
+            Snapshot(self._last, self._n_records(), done, dict(self._verdicts), self._state)
+        )
 
     def _keep(self) -> None:
         """Keep a way back here, and give up those that are older than the bound."""
-        n = self._snapshots[0].n_records + len(self._records)
-        done = self._first + len(self._estimates)
-        self._snapshots.append(Snapshot(self._last, n, done, dict(self._verdicts), self._state))
+        self._mark()
         horizon = self._last[0] - self._config.rewind
         while len(self._snapshots) > 1 and self._snapshots[1].last[0] <= horizon:
-            dropped = self._snapshots.pop(0)
-            del self._records[: self._snapshots[0].n_records - dropped.n_records]
+            n = self._snapshots[1].n_records - self._snapshots.pop(0).n_records
+            while n:
+                n -= self._stretches.pop(0).n_records
 
     # --- what outlives the process
 
@@ -288,7 +286,7 @@ class LiveTrack:
             self.seed,
             self._clock,
             self._snapshots[0],
-            tuple(record for _, record in self._records),
+            joined(self._stretches),
             tuple(s.n_records for s in self._snapshots[1:]),
             self._last_settled,
             dict(self.counts),
@@ -307,23 +305,15 @@ class LiveTrack:
         track._verdicts = Counter(base.verdicts)
         track._first = base.n_estimates
         track._seen = dict.fromkeys(memory.seen)
-        for n, record in enumerate(memory.records, base.n_records):
-            if n in memory.kept:
-                done = track._first + len(track._estimates)
-                track._snapshots.append(Snapshot(track._last, n, done, dict(track._verdicts), track._state))
-            track._redo(record)
+        records = keyed(memory.records.records())
+        edges = [0, *(n - base.n_records for n in memory.kept), len(records)]
+        for start, stop in pairwise(edges):
+            if start:
+                track._mark()
+            if records:
+                track._take_stretch(records[start:stop])
         track.counts = Counter(memory.counts)
         track.is_ended = memory.is_ended
         if track.is_ended:
             track._tail = tracker.flush(track._state, track._state.now)[1]
         return track
-
-    def _redo(self, record: Record) -> None:
-        key = (record.t, _RANK[type(record)])
-        if key[0] - self._last[0] > self._config.gap and self._last != _START:
-            self._verdicts["gaps"] += 1
-        self._state, said, verdict = self._tracker.step(self._state, record)
-        self._verdicts[verdict.value] += 1
-        self._estimates += said
-        self._records.append((key, record))
-        self._last = key
