@@ -29,6 +29,7 @@ router = APIRouter(prefix="/api/v1", tags=["out"])
 _BEAT_S = 15.0  # proxies close what is silent for longer
 _HELLO_S = 10.0  # for a WebSocket to say who it is
 _NUMBER = "^[0-9]{0,18}$"
+_EVENT = {"type": "object", "properties": {name: {"type": "string"} for name in ("id", "event", "data")}}
 _POLICY, _BUSY = 1008, 1013  # codes a WebSocket is closed with
 
 
@@ -37,8 +38,7 @@ _POLICY, _BUSY = 1008, 1013  # codes a WebSocket is closed with
     summary="Positions as they change (Server-Sent Events)",
     response_class=StreamingResponse,
     dependencies=[Depends(SCHEME)],
-    responses=responses(401, 403, 422, 429)
-    | {200: {"content": {"text/event-stream": {"schema": {"type": "string"}}}}},
+    responses=responses(401, 403, 422, 429) | {200: {"content": {"text/event-stream": {"schema": _EVENT}}}},
 )
 async def events(
     request: Request,

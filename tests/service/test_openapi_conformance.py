@@ -1,0 +1,81 @@
+"""The OpenAPI description, drawn from by schemathesis: every answer is one that it promises."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+import schemathesis
+from hypothesis import HealthCheck, given, settings
+from hypothesis.errors import Unsatisfiable
+from schemathesis import GenerationMode
+from schemathesis.specs.openapi.checks import ignored_auth, negative_data_rejection, positive_data_acceptance
+from service_running import App, Running, running
+
+# what a description cannot say: that a site exists, that taps are in order; unknown parameters are ignored, as the web
+# does; and who guesses tokens is soon told 429, not 401 (test_nothing_is_told_without_a_token)
+_NOT_CHECKED = [positive_data_acceptance, negative_data_rejection, ignored_auth]
+_PUBLIC = {"/health"}
+_FEW = settings(max_examples=4, deadline=None, suppress_health_check=list(HealthCheck), derandomize=True)
+_MANY = settings(max_examples=300, deadline=None, suppress_health_check=list(HealthCheck), derandomize=True)
+
+
+@pytest.fixture(scope="module")
+def served(world: Any, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Running]:
+    """A server with a radio map, whose only token may do everything."""
+    data = tmp_path_factory.mktemp("openapi")
+    more = {"particles": 50, "rate_per_s": 0}
+    with running(world.folder, data, "--radio-map", world.folder / "map.npz", **more) as server:
+        yield server
+
+
+def _failures(served: Running, how: settings) -> list[str]:
+    """What schemathesis finds wrong with answers to requests that it draws, valid ones and others."""
+    schema = schemathesis.openapi.from_url(f"{served.address}/openapi.json")
+    found, n = [], 0
+    for result in schema.get_all_operations():
+        operation = result.ok()
+        n += 1
+        for mode in (GenerationMode.POSITIVE, GenerationMode.NEGATIVE):
+
+            @how
+            @given(case=operation.as_strategy(generation_mode=mode))
+            def check(case: schemathesis.Case) -> None:
+                if case.path == "/api/v1/events":
+                    case.query["once"] = True  # the stream would go on
+                headers = {"Authorization": f"Bearer {served.token}"}
+                case.call_and_validate(headers=headers, excluded_checks=_NOT_CHECKED)
+
+            try:
+                check()
+            except Unsatisfiable:
+                continue  # nothing to be wrong about
+            except (AssertionError, BaseExceptionGroup) as error:
+                found.append(f"{operation.label} ({mode.value}): {error}")
+    assert n > 20
+    return found
+
+
+def test_answers_are_as_described(served: Running) -> None:
+    assert not _failures(served, _FEW)
+
+
+@pytest.mark.slow
+def test_many_answers_are_as_described(served: Running) -> None:
+    assert not _failures(served, _MANY)
+
+
+def test_nothing_is_told_without_a_token(app: App) -> None:
+    paths = app.client.get("/openapi.json").json()["paths"]
+    operations = [(path, method, one) for path, some in paths.items() for method, one in some.items()]
+    assert {path for path, _, one in operations if "security" not in one} == _PUBLIC
+    statuses = []
+    for path, method, one in operations:
+        if "security" in one:
+            answer = app.client.request(method, re.sub(r"{\w+}", "0" * 16, path))
+            statuses.append(answer.status_code)
+            assert answer.json().keys() == {"error", "remedy"}
+    assert set(statuses) == {401, 429}  # the latter: so many attempts look like guesses
+    assert statuses[0] == 401
