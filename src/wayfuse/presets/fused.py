@@ -32,6 +32,7 @@ from wayfuse.models.observation.fingerprint import FingerprintLikelihood
 from wayfuse.models.observation.neighbouring import NeighbouringFloors
 from wayfuse.radio.ap_places import ApPlaces
 from wayfuse.radio.device_offset import DeviceOffset
+from wayfuse.radio.range_line import LineGrid
 from wayfuse.radio.sparse_knn import SparseKnn
 from wayfuse.radio.survey import Survey
 from wayfuse.tracking.dead_reckoning import Start
@@ -39,6 +40,7 @@ from wayfuse.tracking.estimate import Estimate, State
 from wayfuse.tracking.floor_change import FloorChange
 from wayfuse.tracking.particle_engine import ParticleEngine, ParticleState, Recovery
 from wayfuse.tracking.radio_parts import Radio
+from wayfuse.tracking.range_parts import Ranging
 from wayfuse.tracking.summary import Summary
 from wayfuse.tracking.tracker import Tracker
 
@@ -92,11 +94,15 @@ class Config:
     diffusion: float = 4.0  # m per root second and axis, where motion sensors are silent
     quiet_exponent: float = 2.0  # tempering there; both as the random walk tuned for itself
     moving_gain: float = 0.3  # of a scan's log-likelihood on stairs and in lifts
-    # ranges: round-trip times indoors are good to a metre in sight, and late behind walls and bodies
-    range_sigma: float = 1.0  # m
-    range_late: float = 0.3
+    # ranges: chosen on loop 1 of wifi-rtt and on simulated warehouses with little and with much bias
+    range_sigma: float = 1.0  # m, about the phone's line; what records state is the scatter of a burst
+    range_late: float = 0.5  # share of ranges that walls and bodies delay beyond it
     range_lateness: float = 3.0  # m
-    range_gain: float = 0.5
+    range_gain: float = 0.3  # tempering: errors of successive ranges of an anchor are much alike
+    range_spacing: float = 0.5  # s between ranges of an anchor; closer ones say less
+    range_near: float = 4.0  # m; ranges beyond say less, in proportion
+    range_creep: float = 0.5  # m per root second and axis, between moments without a step
+    range_lines: LineGrid = field(default_factory=LineGrid)  # how the phone measures; estimated
     map_constraint: Literal["walkable", "barriers", "none"] = "walkable"
     use_steps: bool = True
     device_offset: bool = True  # estimate how the phone's levels differ from the survey's
@@ -175,11 +181,23 @@ def build_from_ranges(
     return _tracker(site, c, None, None, lag, ranging)
 
 
-def _ranging(site: Site, places: ApPlaces, c: Config) -> AnchoredRanges | None:
+def _ranging(site: Site, places: ApPlaces, c: Config) -> Ranging | None:
     if places.is_estimated:  # to some metres: worse than the ranges
         return None
-    return AnchoredRanges.build(
-        site, places, sigma=c.range_sigma, late=c.range_late, lateness=c.range_lateness, gain=c.range_gain
+    ranges = AnchoredRanges.build(
+        site,
+        places,
+        sigma=c.range_sigma,
+        late=c.range_late,
+        lateness=c.range_lateness,
+        gain=c.range_gain,
+        near=c.range_near,
+    )
+    return Ranging(
+        ranges=ranges,
+        lines=c.range_lines,
+        creep=RandomWalk(c.range_creep) if c.range_creep > 0.0 else None,
+        usual_spacing=c.range_spacing,
     )
 
 
@@ -189,7 +207,7 @@ def _tracker(
     radio: Radio | None,
     start: Start | None,
     lag: float,
-    ranging: AnchoredRanges | None = None,
+    ranging: Ranging | None = None,
 ) -> Tracker[ParticleState]:
     motion = PdrMotion(
         length_sigma=c.length_sigma,

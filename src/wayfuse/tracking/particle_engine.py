@@ -17,7 +17,6 @@ from wayfuse.filters.particle_filter import (
     Snapshot,
     replace_particles,
 )
-from wayfuse.filters.resampling import systematic
 from wayfuse.inertial.front_end import StepEvent
 from wayfuse.inertial.vertical import VerticalEvent
 from wayfuse.maps.walkable import Walkable
@@ -29,11 +28,12 @@ from wayfuse.radio.sparse_knn import Neighbours
 from wayfuse.radio.standing import Standing
 from wayfuse.radio.survey import Fingerprint
 from wayfuse.sensors.records import Range
-from wayfuse.tracking.engine import Known, RangeObservation, Why, unknown
+from wayfuse.tracking.engine import Known, Why, unknown
 from wayfuse.tracking.estimate import Estimate, State
 from wayfuse.tracking.fixed_lag import recalled, remembered
 from wayfuse.tracking.floor_change import FloorChange, Movement
 from wayfuse.tracking.radio_parts import Radio
+from wayfuse.tracking.range_parts import Ranging, RangingState
 from wayfuse.tracking.summary import Held, Summary, on_walkable, summarise
 
 __all__ = ["ParticleEngine", "ParticleState", "Recovery"]
@@ -84,7 +84,6 @@ class Recovery:
         return self.injection_least + self.injection * (1.0 - min(agreement, 1.0)) ** 2
 
 
-_SCATTERED = 16  # places tried per particle where ranges begin a track
 _UNCORROBORATED = 10  # steps before which no walk has told the floors apart
 
 
@@ -107,6 +106,8 @@ class ParticleState(NamedTuple):
     scanned: float = -np.inf
     n_walked: int = 0
     standing: Standing | None = None
+    ranged: RangingState | None = None
+    moved: float = -np.inf  # s, of the last step or the last ranges
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -117,12 +118,11 @@ class ParticleEngine:
     ----------
     n_floors : of the site. radio : what answers scans, None = Wi-Fi is not used. ranging : what answers ranges of known
     anchors, None = they are not used. anywhere : where a track that only ranges speak of begins, None = it waits for
-    a scan or a start. start : where the track starts,
-    None = at the first scan; one of the two is needed. prior : the estimate before. motion, constraint : of steps;
-    constraint None = no map. diffusion : motion while no motion sensor speaks. floor_change : takes the cloud over
-    stairs and lifts, None = floors change by scans only. walkable : mask per floor that estimates are kept on, empty =
-    none. uses_steps : False = diffusion always. rotation : rad, heading of building +x from east (headings arrive
-    counter-clockwise from east).
+    a scan or a start. start : where the track starts, None = at the first scan; one of the two is needed. prior : the
+    estimate before. motion, constraint : of steps; constraint None = no map. diffusion : motion while no motion sensor
+    speaks. floor_change : takes the cloud over stairs and lifts, None = floors change by scans only. walkable : mask
+    per floor that estimates are kept on, empty = none. uses_steps : False = diffusion always. rotation : rad, heading
+    of building +x from east (headings arrive counter-clockwise from east).
     """
 
     n_floors: int
@@ -130,7 +130,7 @@ class ParticleEngine:
     motion: PdrMotion
     diffusion: RandomWalk
     radio: Radio | None = None
-    ranging: RangeObservation | None = None
+    ranging: Ranging | None = None
     anywhere: Anywhere | None = None
     start: KnownStart | None = None
     constraint: Constraint | None = None
@@ -200,7 +200,7 @@ class ParticleEngine:
             )
             state = state._replace(movement=movement)
         return self._moved(state, after, n_blocked, why)._replace(
-            is_quiet=False, n_walked=state.n_walked + 1, standing=None
+            is_quiet=False, n_walked=state.n_walked + 1, standing=None, moved=event.t
         )
 
     def on_vertical(self, state: ParticleState, event: VerticalEvent) -> ParticleState:
@@ -247,28 +247,28 @@ class ParticleEngine:
         if self.ranging is None:
             return state
         if state.filter is None:
-            return self._begun_by_ranges(state, self.ranging, ranges, known)
-        log_likelihood = np.zeros(self.n_particles)
-        if not self.ranging.log_likelihood(state.filter.cloud, ranges, log_likelihood):
+            if self.anywhere is None:
+                return state
+            ranged, first = self.ranging.begin(self.anywhere, state.key, self.n_particles, ranges, t, known)
+            return state._replace(ranged=ranged, filter=first, moved=t)
+        now = self._crept(state, state.filter, self.ranging.creep, t)
+        before = state.ranged or self.ranging.init()
+        ranged, log_likelihood = self.ranging.look(before, now.cloud, now.weights, ranges, t)
+        if log_likelihood is None:
             return state
-        after, info = self.filter.update(state.key, state.filter, log_likelihood)
+        after, info = self.filter.update(state.key, now, log_likelihood)
         why = state.why._replace(n_aps=max(state.why.n_aps, len(ranges)))
-        return state._replace(filter=after, why=why, ess=info.ess / self.n_particles)
+        ess = info.ess / self.n_particles
+        return state._replace(filter=after, why=why, ess=ess, ranged=ranged, moved=t)
 
-    def _begun_by_ranges(
-        self, state: ParticleState, ranging: RangeObservation, ranges: Sequence[Range], known: Known
-    ) -> ParticleState:
-        """The first cloud: the best of many that are anywhere."""
-        if self.anywhere is None:
-            return state
-        noise, n = Noise(state.key), _SCATTERED * self.n_particles
-        cloud = self.anywhere.draw(noise, n, heading_known=known.heading)
-        log_weights = np.zeros(n)
-        if not ranging.log_likelihood(cloud, ranges, log_weights):
-            return state
-        many = FilterState(cloud, log_weights, noise.draw)
-        chosen = cloud.take(systematic(noise, many.weights, self.n_particles))
-        return state._replace(filter=FilterState(chosen, np.zeros(self.n_particles), noise.draw))
+    def _crept(
+        self, state: ParticleState, now: FilterState, creep: RandomWalk | None, t: float
+    ) -> FilterState:
+        """Who makes no steps may still move, but not on stairs or in a lift."""
+        dt = t - state.moved
+        if creep is None or state.movement.event is not None or not 0.0 < dt < np.inf:
+            return now
+        return self.filter.predict(state.key, now, creep, dt, self.constraint)[0]
 
     def _weigh(
         self,

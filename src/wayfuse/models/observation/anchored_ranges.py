@@ -7,6 +7,11 @@ r_j is the distance in space from the anchor to the phone at particle x. A wall 
 never hastens it: the tail is one-sided. With :math:`\epsilon = 0` and :math:`\gamma = 1` this is Eq. 10-12 of li2015
 [1]_, whose exponents m_j are those of `models.observation.ranges`.
 
+They sum to 1, so a range says the less the more anchors answer at its moment, and a lone one says all. Where ranges
+come one by one as well as together, `AnchoredRanges.table` has exponents without a sum: 1 up to the distance ``near``,
+and near/d beyond. It also has the phone's line (r_j is offset + slope * distance, `radio.range_line`), and looks at no
+deviation that a record states: phones state the scatter of a burst, and walls make the errors.
+
 References
 ----------
 .. [1] Li, Burbano, Zhao, Carrera, Braun, Fine-grained Indoor Tracking by Fusing Inertial Sensor and Physical Layer
@@ -15,10 +20,12 @@ References
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from wayfuse.core.errors import ConfigError
 from wayfuse.core.types import Array
@@ -34,6 +41,7 @@ _FLOOR = (
     1e-9  # 1/m, density of a range that nothing explains: no particle ever has none, where there is a tail
 )
 _ROOT_TAU = 2.5066282746310002
+_NEAREST = 0.1  # m; a range may come out as zero or less, which has no inverse
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -46,7 +54,7 @@ class AnchoredRanges:
     first. elevations : (n_floors,) m. sigma : m, standard deviation of a range without a wall between; where a record
     states its own, the two add up in squares. late : epsilon, share of ranges that come late. lateness : mu, m.
     exponents : how ranges are weighed against each other. gain : gamma, tempering, for the errors of ranges of one
-    place are alike from moment to moment. phone_height : m above the floor.
+    place are alike from moment to moment. phone_height : m above the floor. near : m, of `table`.
     """
 
     places: ApPlaces
@@ -58,11 +66,13 @@ class AnchoredRanges:
     exponents: Exponents = Exponents.ONE
     gain: float = 1.0
     phone_height: float = 1.2
+    near: float = math.inf
 
     def __post_init__(self) -> None:
-        if not (self.sigma > 0.0 and self.lateness > 0.0 and self.gain > 0.0 and 0.0 <= self.late < 1.0):
+        if not (min(self.sigma, self.lateness, self.gain, self.near) > 0.0 and 0.0 <= self.late < 1.0):
             raise ConfigError(
-                "sigma, lateness and gain must be positive, late a share below 1", where="AnchoredRanges"
+                "sigma, lateness, gain and near must be positive, late a share below 1",
+                where="AnchoredRanges",
             )
         if len(self.offsets) != len(self.elevations):
             raise ConfigError("offsets and elevations of different floors", where="AnchoredRanges")
@@ -83,12 +93,41 @@ class AnchoredRanges:
         if not known:
             return False
         m = range_exponents(np.array([r.distance for r, _ in known]), self.exponents)
+        places = self._places(cloud)
+        for (r, row), weight in zip(known, m, strict=True):
+            sigma = float(np.hypot(self.sigma, r.sigma)) if np.isfinite(r.sigma) else self.sigma
+            out += self.gain * weight * self._log_density(r.distance - self._distance(row, *places), sigma)
+        return True
+
+    def table(
+        self,
+        cloud: Cloud,
+        rows: NDArray[np.int64],
+        measured: Array,
+        gains: Array,
+        offsets: Array,
+        slopes: Array,
+    ) -> Array:
+        """Log-likelihood (k, N) of the ranges of a moment under each of k lines, at each particle.
+
+        Parameters
+        ----------
+        rows : (n,) of ``places``, the anchors. measured : (n,) m. gains : (n,), tempering beside ``gain``.
+        offsets, slopes : (k,) m and 1, of lines measured = offset + slope * distance.
+        """
+        places = self._places(cloud)
+        exponents = self.gain * gains * np.minimum(1.0, self.near / np.maximum(measured, _NEAREST))
+        out = np.zeros((len(offsets), cloud.n))
+        for row, z, exponent in zip(rows.tolist(), measured.tolist(), exponents.tolist(), strict=True):
+            late_by = (z - offsets)[:, None] - np.outer(slopes, self._distance(row, *places))
+            out += exponent * self._log_density(late_by, self.sigma)
+        return out
+
+    def _places(self, cloud: Cloud) -> tuple[Array, Array, Array]:
+        """x, y, z (N,) m of the phones of particles, in the frame of the first floor."""
         x = cloud.x + self.offsets[cloud.floor, 0]
         y = cloud.y + self.offsets[cloud.floor, 1]
-        z = self.elevations[cloud.floor] + self.phone_height
-        for (r, row), weight in zip(known, m, strict=True):
-            out += self.gain * weight * self._log_density(self._distance(row, x, y, z), r)
-        return True
+        return x, y, self.elevations[cloud.floor] + self.phone_height
 
     def _distance(self, row: int, x: Array, y: Array, z: Array) -> Array:
         """(N,) m in space from an anchor; one of unknown height is level with a phone on its floor."""
@@ -98,10 +137,8 @@ class AnchoredRanges:
         dz = z - (self.elevations[floor] + (height if np.isfinite(height) else self.phone_height))
         return np.asarray(np.sqrt(dx * dx + dy * dy + dz * dz))
 
-    def _log_density(self, distance: Array, r: Range) -> Array:
-        """(N,) log density of a range at distances (N,) m, up to a constant of the range where there is no tail."""
-        sigma = float(np.hypot(self.sigma, r.sigma)) if np.isfinite(r.sigma) else self.sigma
-        excess = r.distance - distance
+    def _log_density(self, excess: Array, sigma: float) -> Array:
+        """Log density of ranges longer by ``excess`` (m) than supposed, up to a constant where there is no tail."""
         on_time = -0.5 * (excess / sigma) ** 2
         if self.late == 0.0:
             return np.asarray(on_time)
