@@ -86,10 +86,11 @@ class Server:
         self.tokens, self.audit = TokenStore(self.engine, random), AuditLog(self.engine)
         self.metrics = Metrics()
         self._published: dict[str, int] = {}
+        self.worlds: dict[str, World] = {}
         self.authority = Authority(
             self.tokens, RateLimit(settings.rate_per_s, settings.rate_burst, clock), clock
         )
-        self.worlds = {world.site.name: world for world in (self._world(files) for files in sites)}
+        self.worlds |= {world.site.name: world for world in [self._world(files) for files in sites]}
         config = LiveConfig(rewind=settings.rewind_s, spacing=settings.spacing_s)
         self.live = Live(self.worlds, self.tracks.state, config, settings.seed)
         self.hub = Hub(settings.events)
@@ -138,6 +139,10 @@ class Server:
             self._published[site] = version
         return self._published[site]
 
+    def published_known(self, site: str) -> int | None:
+        """As `published`, without a look into the database; None where that is needed."""
+        return self._published.get(site)
+
     def publish(self, site: str, version: int, actor: str) -> None:
         """Put a version of a radio map to use, for tracks that begin from now on.
 
@@ -147,6 +152,8 @@ class Server:
         """
         self.sites.publish(site, version, self.clock(), actor)
         self._published.pop(site, None)
+        if site in self.worlds:
+            self.worlds[site].tracker(version)  # now, not when the first phone waits
         self.audit.add(self.clock(), actor, "publish radio map", site, f"version {version}")
 
     def roll_back(self, site: str, actor: str) -> int:

@@ -13,6 +13,7 @@ from wayfuse.presets.fused import check_floors
 from wayfuse.presets.methods import build_method
 from wayfuse.radio.survey import Survey
 from wayfuse.radio.walk_survey import load
+from wayfuse.service.warm import warm
 from wayfuse.tracking.tracker import Tracker
 
 __all__ = ["World", "survey_of"]
@@ -56,7 +57,7 @@ class World:
         """The tracker with a version of the radio map; built when first asked for."""
         if version not in self._trackers:
             survey = survey_of(self.site, self._archive(version))
-            self._trackers[version] = build_method(
-                self._method, self.site, survey, n_particles=self._n_particles
-            )
+            tracker = build_method(self._method, self.site, survey, n_particles=self._n_particles)
+            warm(tracker, survey)
+            self._trackers[version] = tracker
         return self._trackers[version]
