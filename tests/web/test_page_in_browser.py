@@ -207,7 +207,7 @@ def test_a_place_is_recorded_by_a_press_on_the_map(look: Callable[..., Any], ser
     page.page.click("text=Make a push address")
     page.page.wait_for_selector("#push-address:not([hidden])")
     address = page.page.input_value("#push-address").replace("sensor-logger?platform=android", "own")
-    assert address.startswith(f"{served.address}/survey/in/wf_")
+    assert address.startswith(f"{served.address}/in/wf_")
 
     def push(number: int) -> None:
         t = time.time()

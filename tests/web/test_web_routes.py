@@ -105,7 +105,7 @@ def test_a_survey_by_phone_and_map_gives_a_radio_map_that_tracks(
 ) -> None:
     assert _built(client)["state"] == "failed"  # there is nothing yet
     token = client.post("/api/v1/tokens", json={"scopes": ["ingest"]}).json()["token"]
-    address = f"/survey/in/{token}"
+    address = f"/in/{token}/survey"
     walked = [_survey_by_hand(client, address, p, f"surveyor {k}") for k, p in enumerate(house.survey[:6])]
     uploaded = []
     for path in house.survey[6:]:
@@ -178,11 +178,11 @@ def test_recordings_that_are_none_are_not_kept(client: Any) -> None:
 def test_pushes_for_the_survey_need_a_token_and_a_platform(client: Any) -> None:
     token = client.post("/api/v1/tokens", json={"scopes": ["ingest"]}).json()["token"]
     push = {"deviceId": "d", "sessionId": "s", "messageId": 1, "payload": []}
-    assert client.post("/survey/in/wf_0_0/sensor-logger", json=push).status_code == 401
-    assert client.post(f"/survey/in/{token}/sensor-logger", json=push).status_code == 499
-    assert client.post(f"/survey/in/{token}/sensor-logger?platform=android", json=push).status_code == 200
-    assert client.post(f"/survey/in/{token}/nowhere", json=push).status_code == 404
-    assert client.post(f"/survey/in/{token}/own", content=b"[").status_code == 400
+    assert client.post("/in/wf_0_0/survey/sensor-logger", json=push).status_code == 401
+    assert client.post(f"/in/{token}/survey/sensor-logger", json=push).status_code == 499
+    assert client.post(f"/in/{token}/survey/sensor-logger?platform=android", json=push).status_code == 200
+    assert client.post(f"/in/{token}/survey/nowhere", json=push).status_code == 404
+    assert client.post(f"/in/{token}/survey/own", content=b"[").status_code == 400
 
 
 def test_built_files_are_served_and_nothing_else(client: Any) -> None:

@@ -225,7 +225,7 @@ def job(request: Request, token: Surveyor, job: int) -> dict[str, Any]:
     return found._asdict()
 
 
-@router.post("/survey/in/{token}/{way}", include_in_schema=False)
+@router.post("/in/{token}/survey/{way}", include_in_schema=False)
 async def take(request: Request, token: str, way: str) -> Response:
     """Scans for the survey, from a client without headers; where a radio map is in use, the phone is tracked too."""
     if way not in _WAYS:

@@ -98,7 +98,7 @@ function makeAddress() {
   const address = el("input", { type: "text", readOnly: true, hidden: true, id: "push-address", aria: { label: "Push address" } });
   const make = action("Make a push address", async () => {
     const { token } = await post("/api/v1/tokens", {}, { scopes: ["ingest"], label: `phone, ${platform.value}`, site: store.site });
-    address.value = `${location.origin}/survey/in/${token}/sensor-logger?platform=${platform.value}`;
+    address.value = `${location.origin}/in/${token}/survey/sensor-logger?platform=${platform.value}`;
     address.hidden = false;
     address.focus();
     address.select();
