@@ -21,7 +21,14 @@ for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ.setdefault(name, "1")
 
 PARTS = {  # module: seconds it may take
-    "hot_path": 45.0,
+    "hot_path": 60.0,
+    "limit": 15.0,
+    "filter_step": 25.0,
+    "gaussian_process": 60.0,
+    "streaming": 8.0,
+    "reading": 16.0,
+    "growth": 40.0,
+    "startup": 20.0,
 }
 
 

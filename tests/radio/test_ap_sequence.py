@@ -161,3 +161,5 @@ def test_the_kernel_is_its_twin_to_the_bit(n: int, tau: Literal["a", "b"]) -> No
     second[0] = first
     second[1] = 1.0  # all tied
     np.testing.assert_array_equal(kendall_tau(first, second, tau), counted_in_numpy(first, second, tau))
+    untied = np.argsort(rng.random((70, n)), axis=1).astype(np.float64)
+    np.testing.assert_array_equal(kendall_tau(first, untied, tau), counted_in_numpy(first, untied, tau))

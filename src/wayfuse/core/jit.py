@@ -13,7 +13,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, TypeVar, cast
 
-__all__ = ["bounded_kernel", "fast_kernel", "inline_kernel", "kernel"]
+__all__ = ["COMPILED", "bounded_kernel", "fast_kernel", "inline_kernel", "kernel"]
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -27,6 +27,8 @@ def _compiler() -> Any:
 
 
 _NUMBA = _compiler()
+COMPILED: bool = _NUMBA is not None and not _NUMBA.config.DISABLE_JIT
+"""Whether kernels are compiled; as plain Python they mention integers that wrap around (`numpy.errstate`)."""
 
 
 def kernel(function: F) -> F:

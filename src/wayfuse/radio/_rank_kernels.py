@@ -22,9 +22,16 @@ def _ones(word: np.uint64) -> np.uint64:
     return np.uint64((word * np.uint64(0x0101010101010101)) >> np.uint64(56))
 
 
+@inline_kernel
+def _bits_of_bytes(word: np.uint64) -> np.uint64:
+    """Eight bytes of 0 or 1, the first the lowest, as eight bits."""
+    return np.uint64((word * np.uint64(0x0102040810204080)) >> np.uint64(56))
+
+
 @kernel
 def tau_of_places(
-    keys: Array,
+    keys: NDArray[np.floating],
+    sign: float,
     ahead: NDArray[np.uint64],
     behind: NDArray[np.uint64],
     ordered: NDArray[np.int64],
@@ -33,7 +40,7 @@ def tau_of_places(
     shift: float,
     out: Array,
 ) -> None:
-    """shift + scale tau (m,) of keys (n,), smallest first, with m sequences; 0 by 0 is a tau of 0.
+    """shift + scale tau (m,) of sign times keys (n,), smallest first, with m sequences; 0 by 0 is a tau of 0.
 
        ``corrected``: tau-b, else tau-a.
     A key of NaN comes after all others, tied with its like. ahead, behind (words, m): bit p of word w is pair 64 w + p
@@ -43,29 +50,44 @@ def tau_of_places(
     words, m, n = ahead.shape[0], ahead.shape[1], len(keys)
     sorted_last = np.empty(n)
     for i in range(n):
-        sorted_last[i] = np.inf if np.isnan(keys[i]) else keys[i]
+        sorted_last[i] = np.inf if np.isnan(keys[i]) else sign * keys[i]
+    less, more = np.zeros(64 * words, np.uint8), np.zeros(64 * words, np.uint8)
+    pair = 0
+    for i in range(n - 1):
+        key, others = sorted_last[i], sorted_last[i + 1 :]
+        less_here, more_here = less[pair : pair + len(others)], more[pair : pair + len(others)]
+        for j in range(len(others)):
+            less_here[j] = np.uint8(key < others[j])
+            more_here[j] = np.uint8(key > others[j])
+        pair += len(others)
     one, two = np.zeros(words, np.uint64), np.zeros(words, np.uint64)
-    a, b, pair = np.uint64(0), np.uint64(0), 0
-    for i in range(n):
-        key = sorted_last[i]
-        for other_key in sorted_last[i + 1 :]:
-            bit = np.uint64(1) << np.uint64(pair & 63)
-            a |= bit if key < other_key else np.uint64(0)
-            b |= bit if key > other_key else np.uint64(0)
-            one[pair >> 6], two[pair >> 6] = a, b
-            pair += 1
-            if pair & 63 == 0:
-                a, b = np.uint64(0), np.uint64(0)
+    less_eight, more_eight = less.view(np.uint64), more.view(np.uint64)
+    for w in range(words):
+        for p in range(8):
+            one[w] |= _bits_of_bytes(less_eight[8 * w + p]) << np.uint64(8 * p)
+            two[w] |= _bits_of_bytes(more_eight[8 * w + p]) << np.uint64(8 * p)
     counts = np.zeros(m, np.int64)
     used = np.int64(0)
     for w in range(words):
         a, b = one[w], two[w]
-        used += np.int64(_ones(a | b))
-        place_ahead, place_behind = ahead[w], behind[w]
+        told = a | b
+        n_told = np.int64(_ones(told))
+        used += n_told
+        place_ahead = ahead[w]
+        if len(behind) == 0:
+            for k in range(m):
+                counts[k] += n_told - np.int64(2) * np.int64(_ones((a ^ place_ahead[k]) & told))
+            continue
+        place_behind = behind[w]
         for k in range(m):
             same = (a & place_ahead[k]) | (b & place_behind[k])
             other = (a & place_behind[k]) | (b & place_ahead[k])
             counts[k] += np.int64(_ones(same)) - np.int64(_ones(other))
+    if corrected:
+        for k in range(m):
+            divisor = math.sqrt(np.float64(used * ordered[k]))
+            out[k] = shift + scale * (np.float64(counts[k]) / divisor if divisor > 0.0 else 0.0)
+        return
+    pairs = max(0.5 * n * (n - 1), 1.0)
     for k in range(m):
-        divisor = math.sqrt(np.float64(used * ordered[k])) if corrected else 0.5 * n * (n - 1)
-        out[k] = shift + scale * (np.float64(counts[k]) / divisor if divisor > 0.0 else 0.0)
+        out[k] = shift + scale * (np.float64(counts[k]) / pairs)

@@ -35,6 +35,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wayfuse.core.errors import ConfigError, UsageError
+from wayfuse.core.jit import COMPILED
 from wayfuse.core.types import Array
 from wayfuse.radio._rank_kernels import tau_of_places
 
@@ -57,7 +58,10 @@ _NEVER = -np.inf  # dBm that stands for "not heard": weaker than any reading, eq
 
 
 class _Orders(NamedTuple):
-    """Bits of the pairs of each sequence, (words, m): first before second, second before first; (m,) not tied."""
+    """Bits of the pairs of each sequence, (words, m): first before second, second before first; (m,) not tied.
+
+    Where no sequence has a tie the second is the opposite of the first, and has no rows.
+    """
 
     ahead: NDArray[np.uint64]
     behind: NDArray[np.uint64]
@@ -89,7 +93,7 @@ def kendall_tau(first: NDArray[np.floating], second: NDArray[np.floating], tau: 
 
     ``tau="a"`` divides by all pairs, ``tau="b"`` is `scipy.stats.kendalltau`; 0 where a divisor is 0.
     """
-    return _tau(first, _orders(second), tau)
+    return _tau(first, 1.0, _orders(second), tau)
 
 
 def grid_places(extent: tuple[float, float, float, float], size: float) -> Array:
@@ -117,7 +121,7 @@ class SequenceMap:
             raise UsageError(
                 f"a scan of shape {rssi.shape}", remedy=f"one value per access point ({self.n_aps})"
             )
-        return _tau(-rssi, self.orders, self.tau, 0.5, 0.5)
+        return _tau(rssi, -1.0, self.orders, self.tau, 0.5, 0.5)
 
     def neighbours(self, rssi: NDArray[np.floating], k: int) -> Neighbours:
         """The k places most similar to a scan, weighted by their similarity."""
@@ -197,7 +201,10 @@ def _orders(keys: NDArray[np.floating]) -> _Orders:
     """Pair bits of m sequences of numbers (m, n), smallest first."""
     first, second = np.triu_indices(keys.shape[1], 1)
     a, b = keys[:, first], keys[:, second]
-    return _Orders(_pack(a < b), _pack(a > b), np.asarray((a != b).sum(axis=1), np.int64))
+    ordered = np.asarray((a != b).sum(axis=1), np.int64)
+    ahead = _pack(a < b)
+    behind = _pack(a > b) if np.any(ordered < a.shape[1]) else np.empty((0, len(keys)), np.uint64)
+    return _Orders(ahead, behind, ordered)
 
 
 def _pack(bits: NDArray[np.bool_]) -> NDArray[np.uint64]:
@@ -209,10 +216,15 @@ def _pack(bits: NDArray[np.bool_]) -> NDArray[np.uint64]:
 
 
 def _tau(
-    keys: NDArray[np.floating], many: _Orders, tau: Tau, scale: float = 1.0, shift: float = 0.0
+    keys: NDArray[np.floating], sign: float, many: _Orders, tau: Tau, scale: float = 1.0, shift: float = 0.0
 ) -> Array:
-    """shift + scale tau (m,) of one sequence (n,), smallest first, with m: Eq. 4 of [1]_, tau-b of [2]_."""
+    """shift + scale tau (m,) of sign times keys (n,), smallest first, with m: Eq. 4 of [1]_, tau-b of [2]_."""
     out = np.empty(len(many.ordered))
-    one = np.ascontiguousarray(keys, dtype=np.float64)
-    tau_of_places(one, many.ahead, many.behind, many.ordered, tau == "b", scale, shift, out)
+    keys = np.ascontiguousarray(keys, dtype=np.float64)  # one type, one compiled version
+    arguments = (keys, sign, many.ahead, many.behind, many.ordered, tau == "b", scale, shift, out)
+    if COMPILED:
+        tau_of_places(*arguments)
+    else:
+        with np.errstate(over="ignore"):  # counting bits multiplies modulo 2^64
+            tau_of_places(*arguments)
     return out
