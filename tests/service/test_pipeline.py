@@ -30,6 +30,7 @@ class Fake:
         self.logged: list[int] = []
         self.applied: list[int] = []
         self.saved: list[tuple[int, list[Any]]] = []
+        self.rounds: list[int] = []
         self.fail_append = self.fail_apply = self.fail_save = 0
         self.gate = threading.Event()
         self.gate.set()
@@ -50,9 +51,13 @@ class Fake:
         assert entry.seq in self.logged  # never before it is in the log
         self.applied.append(entry.seq)
 
-    def checkpoint(self) -> list[str]:
+    def changed(self) -> list[str]:
+        """Of the tracks: two, always."""
+        return ["a", "b"]
+
+    def checkpoint(self, tracks: list[str]) -> list[str]:
         """Of the tracks."""
-        return [f"kept {len(self.applied)}"]
+        return [f"{track} {len(self.applied)}" for track in tracks]
 
     def release(self, _before: float) -> int:
         """Of the tracks."""
@@ -64,6 +69,10 @@ class Fake:
             self.fail_save -= 1
             raise AWAY
         self.saved.append((seq, list(kept)))
+
+    def close_round(self, seq: int) -> None:
+        """Of the store."""
+        self.rounds.append(seq)
 
 
 @contextmanager
@@ -94,7 +103,8 @@ def test_entries_are_logged_then_answered_then_applied_in_order() -> None:
         futures = [pipeline.submit([_item()] * n) for n in (1, 3, 2)]
         assert [f.result(30) for f in futures] == [[1], [2, 3, 4], [5, 6]]
     assert fake.logged == fake.applied == [1, 2, 3, 4, 5, 6]
-    assert fake.saved == [(6, ["kept 6"])]  # at the end
+    assert fake.saved == [(6, ["a 6", "b 6"])]  # at the end
+    assert fake.rounds == [6]
 
 
 def test_a_log_that_cannot_be_written_answers_busy_and_applies_nothing() -> None:
@@ -121,8 +131,20 @@ def test_a_checkpoint_that_cannot_be_written_is_written_later() -> None:
     fake.fail_save = 1
     with working(fake, checkpoint_every=1.0) as pipeline:
         pipeline.submit([_item()]).result(30)
-        wait_until(lambda: fake.saved)
-    assert fake.saved[0] == (1, ["kept 1", "kept 1"])  # nothing that was drained is lost
+        wait_until(lambda: fake.rounds)
+    assert fake.saved[:2] == [(1, ["a 1", "b 1"]), (1, [])]  # nothing that was drained is lost
+
+
+def test_a_round_is_written_in_slices_between_groups() -> None:
+    fake = Fake()
+    with working(fake, checkpoint_every=30.0, slice=1) as pipeline:
+        pipeline.submit([_item()]).result(30)
+        wait_until(lambda: fake.rounds)
+        pipeline.submit([_item()]).result(30)
+    assert fake.saved[:2] == [(1, ["a 1"]), (1, ["b 1"])]
+    assert fake.saved[-1] == (2, ["a 2", "b 2"])  # at the end all at once
+    assert fake.rounds[0] == 1
+    assert fake.rounds[-1] == 2
 
 
 def test_too_much_that_waits_is_refused() -> None:

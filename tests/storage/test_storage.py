@@ -156,9 +156,13 @@ def test_checkpoints_and_estimates_come_back_to_the_bit(engine: Engine) -> None:
     first, second = [_estimate(1.0), _estimate(2.0)], [_estimate(3.0)]
     store.save(17, [Checkpoint(row, 0, first, b"one"), Checkpoint(row._replace(track="u"), 0, [], b"x")])
     store.save(18, [Checkpoint(row._replace(heard=9.0), 2, second, b"two")])
-    assert store.round() == 18
-    assert last_seq(engine) == 18  # though the log is empty
-    assert store.state("t") == (row._replace(heard=9.0), b"two")
+    assert store.round() == 0
+    assert store.newest_seq() == 18
+    store.close_round(16)
+    store.close_round(17)
+    assert store.round() == 17
+    assert last_seq(engine) == 17  # though the log is empty
+    assert store.state("t") == (row._replace(heard=9.0), b"two", 18)
     assert store.state("nobody") is None
     assert store.estimates("t") == list(enumerate(first + second))
     assert store.estimates("t", since=2.0, until=2.5) == [(1, first[1])]
@@ -177,16 +181,16 @@ def test_checkpoints_and_estimates_come_back_to_the_bit(engine: Engine) -> None:
     assert store.estimates("t") == [(0, second[0])]
 
 
-def test_a_round_is_written_whole_or_not_at_all(engine: Engine) -> None:
+def test_checkpoints_are_written_whole_or_not_at_all(engine: Engine) -> None:
     store = TrackStore(engine)
     row = TrackRow("t", "site", "d", 1, 5.0, 6.0)
     store.save(1, [Checkpoint(row, 0, [_estimate(1.0), _estimate(2.0)], b"one")])
     twice = Checkpoint(row, 1, [_estimate(2.0)], b"y")  # there is a number 1 already
     with pytest.raises(IntegrityError):
         store.save(2, [Checkpoint(row._replace(track="u"), 0, [], b"x"), twice])
-    assert store.round() == 1
+    assert store.newest_seq() == 1
     assert store.state("u") is None
-    assert store.state("t") == (row, b"one")
+    assert store.state("t") == (row, b"one", 1)
 
 
 def test_a_forgotten_phone_leaves_nothing_but_empty_rows(engine: Engine) -> None:

@@ -6,7 +6,7 @@ import json
 import logging
 import threading
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -26,7 +26,7 @@ from wayfuse.tracking.tracker import TrackState
 __all__ = ["Applied", "Live", "Look", "View", "profile_json", "read_entry"]
 
 _log = logging.getLogger(__name__)
-Recall = Callable[[str], tuple[TrackRow, bytes] | None]
+Recall = Callable[[str], tuple[TrackRow, bytes, int] | None]
 
 
 class View(NamedTuple):
@@ -83,6 +83,7 @@ class _Held:
     row: TrackRow
     track: LiveTrack
     is_dirty: bool = True
+    seq: int = 0  # up to where the log is in the checkpoint it came from
 
 
 class Live:
@@ -123,6 +124,8 @@ class Live:
         with self._lock:
             try:
                 held = self._of(entry)
+                if entry.seq <= held.seq:
+                    return None  # the log is read again, and this is in the checkpoint already
                 held.row = held.row._replace(heard=entry.arrived)
                 held.is_dirty = True
                 changed = held.track.apply(message, entry.arrived)
@@ -156,7 +159,7 @@ class Live:
         kept = self._recall(track)
         if kept is None or kept[0].site not in self._worlds:
             return None
-        row, state = kept
+        row, state, seq = kept
         try:
             memory = unpack(state)
         except FormatError as error:
@@ -166,18 +169,23 @@ class Live:
         if not isinstance(memory, Memory):
             raise FormatError("a checkpoint that is no memory of a track", where=track)
         tracker = self._worlds[row.site].tracker(row.map_version)
-        return _Held(row, LiveTrack.recall(tracker, memory, self._config), is_dirty=False)
+        return _Held(row, LiveTrack.recall(tracker, memory, self._config), is_dirty=False, seq=seq)
 
     def load(self, track: str) -> bool:
         """Bring a track from its checkpoint into memory; whether there is such a track."""
         with self._lock:
             return track in self._held or self._load(track) is not None
 
-    def checkpoint(self) -> list[Checkpoint]:
-        """What changed since the last time, to be written together; it must be written, or the process must end."""
+    def changed(self) -> list[str]:
+        """Tracks that changed since their last checkpoint."""
+        with self._lock:
+            return [track for track, held in self._held.items() if held.is_dirty]
+
+    def checkpoint(self, tracks: Iterable[str]) -> list[Checkpoint]:
+        """Those of the tracks that changed, as they are now; they must be written, or the process must end."""
         with self._lock:
             out = []
-            for held in self._held.values():
+            for held in [self._held[track] for track in tracks if track in self._held]:
                 if held.is_dirty:
                     first, settled = held.track.drain()
                     out.append(Checkpoint(held.row, first, settled, pack(held.track.memory())))

@@ -1,8 +1,9 @@
 """From accepted batches to tracks: one thread that writes the log and then feeds the tracks.
 
 Whatever waits is written as one group in one transaction, so that the price of a sync is shared; only then are the
-senders answered. After that the group goes into the tracks, in the order of the log. A checkpoint now and then keeps
-the part of the log short that must be read again after a crash.
+senders answered. After that the group goes into the tracks, in the order of the log. A round of checkpoints now and
+then keeps the part of the log short that must be read again after a crash; a few tracks at a time, between groups, so
+that no phone waits for the checkpoints of all.
 """
 
 from __future__ import annotations
@@ -47,7 +48,8 @@ class PipelineConfig:
     """Limits and periods.
 
     max_waiting, max_waiting_bytes : what may wait to be written. group : most entries of one transaction.
-    checkpoint_every : s between checkpoints. retry_every : s until a database that was away is asked again.
+    checkpoint_every : s between rounds of checkpoints. slice : tracks that are written at once.
+    retry_every : s until a database that was away is asked again.
     idle : s until a silent track leaves the memory.
     """
 
@@ -55,11 +57,15 @@ class PipelineConfig:
     max_waiting_bytes: int = 256 << 20
     group: int = 512
     checkpoint_every: float = 10.0
+    slice: int = 20
     retry_every: float = 1.0
     idle: float = 900.0
 
     def __post_init__(self) -> None:
-        if min(self.max_waiting, self.max_waiting_bytes, self.group) < 1 or not self.checkpoint_every > 0.0:
+        if (
+            min(self.max_waiting, self.max_waiting_bytes, self.group, self.slice) < 1
+            or not self.checkpoint_every > 0.0
+        ):
             raise ConfigError("the limits of the pipeline must be positive", where="PipelineConfig")
 
 
@@ -92,12 +98,13 @@ class Pipeline:
         self._log, self._live, self._tracks = log, live, tracks
         self._clock, self._publish = clock, publish
         self._next = next_seq
-        self._kept = self.applied  # seq of the last checkpoint
+        self._kept = self.applied  # seq of the last round
+        self._round: tuple[int, list[str]] | None = None  # its seq, and tracks still to be written
         self._due = clock() + self._config.checkpoint_every
         self._queue: deque[_Waiting] = deque()
         self._calls: list[Callable[[], None]] = []
         self._bytes = 0
-        self._unsaved: list[Checkpoint] = []  # of rounds that could not be written
+        self._unsaved: list[tuple[int, list[Checkpoint]]] = []  # those that could not be written
         self._wake = threading.Condition()
         self._stopping = False
         self._thread = threading.Thread(target=self._run, name="wayfuse-pipeline", daemon=True)
@@ -177,8 +184,7 @@ class Pipeline:
             if group:
                 self._do(group)
             is_over = self._is_over()
-            if self._kept < self.applied and (self._clock() >= self._due or is_over):
-                self._checkpoint()
+            self._checkpoint(is_last=is_over)
             if is_over:
                 return
 
@@ -188,7 +194,7 @@ class Pipeline:
 
     def _take(self) -> tuple[list[_Waiting], list[Callable[[], None]]]:
         with self._wake:
-            if not (self._queue or self._calls or self._stopping):
+            if not (self._queue or self._calls or self._stopping or self._round):
                 self._wake.wait(min(1.0, self._config.checkpoint_every))
             group: list[_Waiting] = []
             n = 0
@@ -241,19 +247,34 @@ class Pipeline:
 
     def drop(self, tracks: Collection[str]) -> None:
         """Leave tracks out of what is still to be written; to be used in `call` alone."""
-        self._unsaved = [kept for kept in self._unsaved if kept.row.track not in tracks]
+        self._unsaved = [(seq, [k for k in kept if k.row.track not in tracks]) for seq, kept in self._unsaved]
 
-    def _checkpoint(self) -> None:
+    def _checkpoint(self, *, is_last: bool) -> None:
+        """Begin a round where one is due, and go on with it: a slice, or at the end all that is left."""
+        if self._round is None and self._kept < self.applied and (is_last or self._clock() >= self._due):
+            self._round = (self.applied, self._live.changed())
+        if self._round is None:
+            return
+        seq, tracks = self._round
+        n = len(tracks) if is_last else self._config.slice
+        some, tracks[:] = tracks[:n], tracks[n:]
+        self._unsaved.append((self.applied, self._live.checkpoint(some)))
+        try:
+            while self._unsaved:
+                self._tracks.save(*self._unsaved[0])
+                del self._unsaved[0]
+            if tracks:
+                return
+            self._tracks.close_round(seq)
+        except SQLAlchemyError as error:
+            _log.error("checkpoints cannot be written: %s", type(error).__name__)
+            if not is_last:
+                with self._wake:
+                    self._wake.wait(self._config.retry_every)
+            return
+        self._round, self._kept = None, seq
         now = self._clock()
         self._due = now + self._config.checkpoint_every
-        self._unsaved += self._live.checkpoint()
-        try:
-            self._tracks.save(self.applied, self._unsaved)
-        except SQLAlchemyError as error:
-            _log.error("the checkpoint cannot be written: %s", type(error).__name__)
-            return
-        self._unsaved.clear()
-        self._kept = self.applied
         self._live.release(now - self._config.idle)
 
 

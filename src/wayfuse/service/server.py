@@ -185,7 +185,7 @@ class Server:
         """
         next_seq = last_seq(self.engine) + 1
         recovered: list[Event] = []
-        kept = self.tracks.round()
+        kept = max(self.tracks.round(), self.tracks.newest_seq())  # events before are not made again
         n = recover(
             self.log,
             self.live,

@@ -1,15 +1,17 @@
 """Tracks: settled estimates, and checkpoints to go on from; written together, so that they always fit.
 
-A checkpoint round says: all of the log up to ``seq`` is in the states and estimates written with it. A server that
-starts reads the states and then the log after ``seq``.
+A checkpoint says: all of the log up to its ``seq`` is in this state and the estimates written with it. A round is
+closed when every track that changed before it began has one; a server that starts reads the states, and then the log
+after the last round for each track from its own ``seq`` on.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
-from sqlalchemy import Connection, Engine, delete, func, insert, select, update
+from sqlalchemy import Connection, Engine, Table, delete, func, insert, select, update
+from sqlalchemy.dialects import postgresql, sqlite
 
 from wayfuse.storage.schema import checkpoints, counters, estimates, ingest_log, tracks
 from wayfuse.tracking.estimate import Estimate, State
@@ -32,7 +34,7 @@ class TrackRow(NamedTuple):
 
 
 class Checkpoint(NamedTuple):
-    """What a round keeps of a track: estimates that can no longer change, from number ``first`` on, and the state."""
+    """What is kept of a track: estimates that can no longer change, from number ``first`` on, and the state."""
 
     row: TrackRow
     first: int
@@ -46,11 +48,29 @@ class TrackStore:
     def __init__(self, engine: Engine) -> None:
         self._engine = engine
 
-    def save(self, seq: int, kept: Iterable[Checkpoint]) -> None:
-        """Write a round in one transaction."""
+    def save(self, seq: int, kept: Sequence[Checkpoint]) -> None:
+        """Write checkpoints, each with all of the log up to ``seq`` in it, in one transaction."""
+        if not kept:
+            return
         with self._engine.begin() as connection:
-            for each in kept:
-                _save(connection, seq, each)
+            _put(connection, tracks, [each.row._asdict() for each in kept])
+            states = [{"track": each.row.track, "seq": seq, "state": each.state} for each in kept]
+            _put(connection, checkpoints, states)
+            # begun anew: a checkpoint of another version could not be gone on from
+            anew = [each.row.track for each in kept if each.first == 0]
+            if anew:
+                connection.execute(delete(estimates).where(estimates.c.track.in_(anew)))
+            rows = [
+                {"track": each.row.track, "n": n, **e._asdict(), "state": e.state.value}
+                for each in kept
+                for n, e in enumerate(each.settled, each.first)
+            ]
+            if rows:
+                connection.execute(insert(estimates), rows)
+
+    def close_round(self, seq: int) -> None:
+        """Say that all of the log up to ``seq`` is in checkpoints."""
+        with self._engine.begin() as connection:
             connection.execute(delete(counters).where(counters.c.name == _ROUND))
             connection.execute(insert(counters).values(name=_ROUND, value=seq))
 
@@ -60,14 +80,19 @@ class TrackStore:
             found = connection.execute(select(counters.c.value).where(counters.c.name == _ROUND)).scalar()
         return int(found or 0)
 
-    def state(self, track: str) -> tuple[TrackRow, bytes] | None:
-        """A track and its checkpoint."""
+    def newest_seq(self) -> int:
+        """The greatest seq that is in any checkpoint, 0 before the first."""
+        with self._engine.connect() as connection:
+            return int(connection.execute(select(func.max(checkpoints.c.seq))).scalar() or 0)
+
+    def state(self, track: str) -> tuple[TrackRow, bytes, int] | None:
+        """A track, its checkpoint, and up to where the log is in it."""
         with self._engine.connect() as connection:
             row = connection.execute(select(tracks).where(tracks.c.track == track)).first()
-            state = connection.execute(
-                select(checkpoints.c.state).where(checkpoints.c.track == track)
-            ).scalar()
-        return None if row is None or state is None else (TrackRow(*row), bytes(state))
+            kept = connection.execute(
+                select(checkpoints.c.state, checkpoints.c.seq).where(checkpoints.c.track == track)
+            ).first()
+        return None if row is None or kept is None else (TrackRow(*row), bytes(kept[0]), int(kept[1]))
 
     def row(self, track: str) -> TrackRow | None:
         """A track."""
@@ -130,25 +155,14 @@ class TrackStore:
             return gone
 
 
-def _save(connection: Connection, seq: int, kept: Checkpoint) -> None:
-    name = kept.row.track
-    known = connection.execute(select(tracks.c.track).where(tracks.c.track == name)).first()
-    if known is None:
-        connection.execute(insert(tracks).values(**kept.row._asdict()))
-        connection.execute(insert(checkpoints).values(track=name, seq=seq, state=kept.state))
-    else:
-        connection.execute(update(tracks).where(tracks.c.track == name).values(**kept.row._asdict()))
-        connection.execute(
-            update(checkpoints).where(checkpoints.c.track == name).values(seq=seq, state=kept.state)
-        )
-    if kept.first == 0:  # begun anew: a checkpoint of another version could not be gone on from
-        connection.execute(delete(estimates).where(estimates.c.track == name))
-    if kept.settled:
-        rows = [
-            {"track": name, "n": n, **e._asdict(), "state": e.state.value}
-            for n, e in enumerate(kept.settled, kept.first)
-        ]
-        connection.execute(insert(estimates), rows)
+def _put(connection: Connection, table: Table, rows: Sequence[Mapping[str, Any]]) -> None:
+    """Insert rows, or replace those of their tracks."""
+    kind = sqlite if connection.dialect.name == "sqlite" else postgresql
+    statement = kind.insert(table)
+    values = {name: statement.excluded[name] for name in rows[0] if name != "track"}
+    connection.execute(
+        statement.on_conflict_do_update(index_elements=["track"], set_=values), [dict(r) for r in rows]
+    )
 
 
 def _estimate(row: Any) -> Estimate:
