@@ -16,6 +16,7 @@ __all__ = [
     "add_places",
     "add_ranges",
     "block_on_mask",
+    "late_log_density",
     "mixture_log_likelihood",
     "pdr_move",
 ]
@@ -154,6 +155,21 @@ def add_ranges(
                 dy = y[i] - ay
                 e = d - math.sqrt(dx * dx + dy * dy)
                 out[i] -= p * (e * e)
+
+
+@fast_kernel
+def late_log_density(
+    excess: Array, sigma: float, late: float, lateness: float, least: float, out: Array
+) -> None:
+    """Write log((1 - e) N(d; 0, s²) + e exp(-d / mu) / mu [d > 0]), at least log ``least``, of d (n,) m to ``out``."""
+    scale = np.float32(-0.5 / (sigma * sigma))
+    peak = np.float32((1.0 - late) / (2.5066282746310002 * sigma))
+    rate, share = np.float32(-1.0 / lateness), np.float32(late / lateness)
+    floor = np.float32(least)
+    for i in range(len(excess)):
+        d = np.float32(excess[i])
+        tail = share * exp32(rate * max(d, np.float32(0.0))) * np.float32(d > np.float32(0.0))
+        out[i] = log32(max(peak * exp32(scale * d * d) + tail, floor))
 
 
 @fast_kernel

@@ -31,6 +31,7 @@ from wayfuse.core.errors import ConfigError
 from wayfuse.core.types import Array
 from wayfuse.filters.cloud import Cloud
 from wayfuse.maps.site import Site
+from wayfuse.models._kernels import late_log_density
 from wayfuse.models.observation.ranges import Exponents, range_exponents
 from wayfuse.radio.ap_places import ApPlaces
 from wayfuse.sensors.records import Range
@@ -40,7 +41,6 @@ __all__ = ["AnchoredRanges"]
 _FLOOR = (
     1e-9  # 1/m, density of a range that nothing explains: no particle ever has none, where there is a tail
 )
-_ROOT_TAU = 2.5066282746310002
 _NEAREST = 0.1  # m; a range may come out as zero or less, which has no inverse
 
 
@@ -139,9 +139,9 @@ class AnchoredRanges:
 
     def _log_density(self, excess: Array, sigma: float) -> Array:
         """Log density of ranges longer by ``excess`` (m) than supposed, up to a constant where there is no tail."""
-        on_time = -0.5 * (excess / sigma) ** 2
         if self.late == 0.0:
-            return np.asarray(on_time)
-        tail = np.where(excess > 0.0, np.exp(-np.maximum(excess, 0.0) / self.lateness) / self.lateness, 0.0)
-        density = (1.0 - self.late) / (_ROOT_TAU * sigma) * np.exp(on_time) + self.late * tail
-        return np.asarray(np.log(np.maximum(density, _FLOOR)))
+            return np.asarray(-0.5 * (excess / sigma) ** 2)
+        flat = np.ascontiguousarray(excess, dtype=np.float64).ravel()
+        density = np.empty_like(flat)
+        late_log_density(flat, sigma, self.late, self.lateness, _FLOOR, density)
+        return density.reshape(excess.shape)
