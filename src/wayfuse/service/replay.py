@@ -12,7 +12,7 @@ import numpy as np
 from wayfuse.core.errors import ConfigError
 from wayfuse.sensors.recording import Recording, Series
 from wayfuse.sensors.records import WifiScan, bssid_text
-from wayfuse.service.wire import Advertisement, Ap, Distance, Envelope, Scan
+from wayfuse.service.wire import Advertisement, Ap, Distance, Envelope, Scan, Stepped
 
 __all__ = ["envelopes"]
 
@@ -63,6 +63,7 @@ def _envelope(
             for d in r.ranges
             if after < d.t <= to
         ],
+        steps=[Stepped(s.t, s.heading, _known(s.length)) for s in r.steps if after < s.t <= to],
         end=is_last,
     )
 

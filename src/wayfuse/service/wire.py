@@ -21,6 +21,7 @@ __all__ = [
     "Name",
     "Quad",
     "Scan",
+    "Stepped",
     "Triple",
     "check_count",
     "decode",
@@ -72,11 +73,20 @@ class Distance(msgspec.Struct, array_like=True, frozen=True):
     rssi: float | None = None
 
 
+class Stepped(msgspec.Struct, array_like=True, frozen=True):
+    """A step the phone worked out: [t, heading (rad counter-clockwise from east), length (m, null unknown)]."""
+
+    t: float
+    heading: float
+    length: float | None = None
+
+
 class Envelope(msgspec.Struct, frozen=True, kw_only=True):
     """The own envelope, version 1. Times are seconds of the phone's clock (Unix time where it has it).
 
     device, track : what the phone calls itself and this session. id : of this message, for repetitions. Samples are
-    rows [t, values...] in SI units (µT, hPa) about Android's axes. end : the session is over.
+    rows [t, values...] in SI units (µT, hPa) about Android's axes. steps : instead of motion samples.
+    end : the session is over.
     """
 
     v: Annotated[int, msgspec.Meta(ge=1, le=1)]
@@ -91,6 +101,7 @@ class Envelope(msgspec.Struct, frozen=True, kw_only=True):
     wifi: list[Scan] = []
     ble: list[Advertisement] = []
     ranges: list[Distance] = []
+    steps: list[Stepped] = []
     end: bool = False
 
 

@@ -1,4 +1,4 @@
-"""The own envelope: raw samples, scans and ranges of a phone, as `wire.Envelope`."""
+"""The own envelope: raw samples or steps, scans and ranges of a phone, as `wire.Envelope`."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ import numpy as np
 from wayfuse.formats.assembly import assemble
 from wayfuse.formats.columns import Column, Piece, Rows
 from wayfuse.sensors.quality import ReadReport
-from wayfuse.sensors.records import Range, Record
+from wayfuse.sensors.records import Range, Record, Step
 from wayfuse.service.adapters.parts import digest_key, identifier, merged, notes_of
 from wayfuse.service.message import Message, Part, Profile
-from wayfuse.service.wire import Distance, Envelope, check_count, decode
+from wayfuse.service.wire import Distance, Envelope, Stepped, check_count, decode
 
 __all__ = ["Own"]
 
@@ -31,7 +31,8 @@ class Own:
         report = ReadReport()
         recording = assemble([Piece(_columns(envelope))], report, name="", clock="", one_stream=False)
         ranges = [_range(row) for row in envelope.ranges if _is_possible(row, report)]
-        records = merged(recording.records(), ranges)
+        steps = [_step(row) for row in envelope.steps]
+        records = merged(recording.records(), [*ranges, *steps])
         key = digest_key(body) if envelope.id is None else f"id {envelope.id}"
         return [
             Message(
@@ -47,7 +48,7 @@ class Own:
 
 def _count(e: Envelope) -> int:
     n = sum(len(getattr(e, kind)) for kind in _SERIES)
-    return n + sum(len(scan.aps) for scan in e.wifi) + len(e.ble) + len(e.ranges)
+    return n + sum(len(scan.aps) for scan in e.wifi) + len(e.ble) + len(e.ranges) + len(e.steps)
 
 
 def _columns(envelope: Envelope) -> dict[str, Column]:
@@ -69,6 +70,10 @@ def _columns(envelope: Envelope) -> dict[str, Column]:
         power = math.nan if heard.tx_power is None else heard.tx_power
         rows_of.add("ble", n, heard.t, (heard.rssi, power), identifier(heard.id))
     return columns | rows_of.columns()
+
+
+def _step(row: Stepped) -> Record:
+    return Step(row.t, math.nan if row.length is None else row.length, row.heading)
 
 
 def _range(row: Distance) -> Record:
