@@ -1,6 +1,6 @@
 """How many phones one core serves: phones replayed against a running server, over HTTP.
 
-    python -m benchmarks.server_load [--mode raw scans] [--walks simulated ms-indoor] [--page]
+    python -m benchmarks.server_load [--mode steps raw] [--walks simulated ms-indoor] [--page]
 
 The server runs as `wayfuse serve` on one core, with its defaults, but for the limit on requests per token; the phones
 on another. Modes: ``raw``, all samples of a phone's motion sensors; ``steps``, the steps that a phone worked out itself
@@ -15,10 +15,9 @@ import os
 import sys
 import tempfile
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
-import msgspec
 import numpy as np
 import uvloop
 
@@ -26,17 +25,19 @@ from benchmarks.report import machine
 from benchmarks.server_page import table, write_section
 from benchmarks.server_phones import MARK, Phones, Script
 from benchmarks.server_process import Scene, development, serving, simulated
+from wayfuse.inertial.front_end import InertialFrontEnd
 from wayfuse.sensors.recording import Recording
+from wayfuse.sensors.records import Step
 from wayfuse.service.replay import envelopes
-from wayfuse.service.wire import Envelope, encode
+from wayfuse.service.wire import encode
 
 GOAL_S = 0.25  # 99 % of positions within, from the moment a batch is sent
 PERIOD = 1.0  # s between a phone's batches
 WARM_S = 5.0  # connections, first batches of all tracks
 MOST_RUNS = 5
 CLOSE = 1.15  # ratio of the bounds at which the search ends
+MODES = ("steps", "raw", "scans")
 _SEED = 7
-_SERIES = ("acceleration", "rotation_rate", "magnetic_field", "orientation", "pressure")
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,20 +61,26 @@ class Run:
 
 def scripts(walks: Sequence[Recording], mode: str) -> list[Script]:
     """Bodies of phones: one per walk and period. Walks shorter than a minute are joined: a phone walks on."""
-    made = [[_body(e, mode) for e in envelopes(walk, MARK.decode(), walk.name, PERIOD)] for walk in walks]
     joined: list[list[bytes]] = []
-    for one in made:
+    for walk in walks:
+        sent = replace(told(walk, mode), name=walk.name)
+        made = [encode(e) for e in envelopes(sent, MARK.decode(), f"{walk.name} {MARK.decode()}", PERIOD)]
         if joined and len(joined[-1]) < 60.0 / PERIOD:
-            joined[-1] += one
+            joined[-1] += made
         else:
-            joined.append(one)
+            joined.append(made)
     return [*joined]
 
 
-def _body(envelope: Envelope, mode: str) -> bytes:
-    if mode == "scans":
-        envelope = msgspec.structs.replace(envelope, **{kind: [] for kind in _SERIES})
-    return encode(msgspec.structs.replace(envelope, track=f"{envelope.track} {MARK.decode()}"))
+def told(walk: Recording, mode: str) -> Recording:
+    """What a phone sends of a walk."""
+    if mode == "raw":
+        return walk
+    front_end = InertialFrontEnd()
+    events = front_end.run(front_end.init(), walk, -np.inf, walk.span[1])[1]
+    columns = (events.t.tolist(), events.length.tolist(), events.heading.tolist())
+    steps = tuple(Step(*row) for row in zip(*columns, strict=True))
+    return Recording(name=walk.name, wifi=walk.wifi, steps=steps if mode == "steps" else ())
 
 
 def one_run(scene: Scene, mode: str, phones: int, seconds: float, cores: tuple[int, int]) -> Run:
@@ -108,7 +115,7 @@ def search(scene: Scene, mode: str, seconds: float, first: int, cores: tuple[int
     """Runs, in the order of their numbers of phones."""
     if not first:
         one_run(scene, mode, 20, 3.0, cores)  # files in the cache, kernels compiled
-        first = max(10, int(0.8 / one_run(scene, mode, 40, 10.0, cores).cpu))
+        first = max(10, int(0.6 / one_run(scene, mode, 40, 10.0, cores).cpu))
     runs: list[Run] = []
     low, high, n = 0, 0, first
     while len(runs) < MOST_RUNS and n:
@@ -121,8 +128,15 @@ def search(scene: Scene, mode: str, seconds: float, first: int, cores: tuple[int
         if low and high:
             n = round((low * high) ** 0.5) if high > CLOSE * low else 0
         else:
-            n = round(n * 1.3) if low else round(n * 0.75)
+            n = round(n * _further(runs[-1]))
     return sorted(runs, key=lambda run: run.phones)
+
+
+def _further(run: Run) -> float:
+    """How many times the phones to try next, while only one bound is known."""
+    if run.is_sustained:
+        return 1.6 if run.place[2] < 0.5 * GOAL_S else 1.3
+    return 0.5 if run.place[2] > 4.0 * GOAL_S else 0.75
 
 
 def _line(run: Run) -> str:
@@ -156,16 +170,28 @@ def _ms(times: tuple[float, float, float]) -> str:
 
 def _what(scene: Scene, mode: str) -> str:
     """Contents of a batch, in figures."""
+    sent = [told(walk, mode) for walk in scene.walks]
     seconds = sum(walk.span[1] - walk.span[0] for walk in scene.walks)
-    bodies = [body for script in scripts(scene.walks, mode) for body in script]
-    scans = sum(len(walk.wifi) for walk in scene.walks) / seconds
-    readings = float(np.mean([len(scan.bssid) for walk in scene.walks for scan in walk.wifi]))
-    samples = sum(len(getattr(walk, kind)) for walk in scene.walks for kind in _SERIES) / seconds
-    said = {"raw": f"{samples:.0f} samples of motion sensors a second, ", "scans": ""}[mode]
+    size = np.mean([len(body) for script in scripts(scene.walks, mode) for body in script]) / 1e3
+    readings = np.mean([len(scan.bssid) for walk in sent for scan in walk.wifi])
+    per_s = [sum(of(walk) for walk in sent) / seconds for of in (_samples, _n_steps, _scans)]
     return (
-        f"{scene.name}, {mode}: {len(scene.walks)} walks; {said}{scans:.2f} scans a second of {readings:.0f} readings; "
-        f"a batch each {PERIOD:g} s, {np.mean([len(b) for b in bodies]) / 1e3:.1f} kB"
+        f"{scene.name}, {mode}: {len(sent)} walks; a second has {per_s[0]:.0f} samples of motion sensors, "
+        f"{per_s[1]:.1f} steps and {per_s[2]:.2f} scans of {readings:.0f} readings; a batch each {PERIOD:g} s, "
+        f"{size:.1f} kB"
     )
+
+
+def _samples(walk: Recording) -> int:
+    return walk.n_motion
+
+
+def _n_steps(walk: Recording) -> int:
+    return len(walk.steps)
+
+
+def _scans(walk: Recording) -> int:
+    return len(walk.wifi)
 
 
 def main(arguments: list[str] | None = None) -> list[Run]:
@@ -173,7 +199,7 @@ def main(arguments: list[str] | None = None) -> list[Run]:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("--mode", nargs="+", default=["raw"], choices=("raw", "scans"))
+    parser.add_argument("--mode", nargs="+", default=["steps", "raw"], choices=MODES)
     parser.add_argument("--walks", nargs="+", default=["simulated"], choices=("simulated", "ms-indoor"))
     parser.add_argument("--seconds", type=float, default=60.0)
     parser.add_argument(

@@ -158,7 +158,7 @@ def soak(scene: Scene, data: Path, hours: float) -> tuple[list[Sample], int]:
     clock = Clock(start)
     files = [SiteFiles(scene.folder / "SITE", scene.folder / "map.npz")]
     server = Server(Settings(data=str(data), **_SETTINGS), files, clock=clock, random=secrets.token_bytes)
-    all_scripts = scripts(scene.walks, "scans")
+    all_scripts = scripts(scene.walks, "steps")
     samples: list[Sample] = []
     with _served(server) as process:
         watcher = _Watcher(process)
