@@ -118,17 +118,16 @@ def search(scene: Scene, mode: str, seconds: float, first: int, cores: tuple[int
         first = max(10, int(0.6 / one_run(scene, mode, 40, 10.0, cores).cpu))
     runs: list[Run] = []
     low, high, n = 0, 0, first
-    while len(runs) < MOST_RUNS and n:
+    while len(runs) < MOST_RUNS:
         runs.append(one_run(scene, mode, n, seconds, cores))
         print(_line(runs[-1]), flush=True)
         if runs[-1].is_sustained:
             low = n
         else:
             high = n
-        if low and high:
-            n = round((low * high) ** 0.5) if high > CLOSE * low else 0
-        else:
-            n = round(n * _further(runs[-1]))
+        n = round(n * _further(runs[-1]) if not (low and high) else (low * high) ** 0.5)
+        if 0 < high < CLOSE * low:
+            break
     return sorted(runs, key=lambda run: run.phones)
 
 
