@@ -17,12 +17,13 @@ __all__ = ["Event", "Hub"]
 
 
 class Event(NamedTuple):
-    """A change of a track: JSON of the feature of its latest position."""
+    """A change of a track, as JSON: the feature of its latest position, or a zone that it entered or left."""
 
     id: int
     site: str
     track: str
     data: bytes
+    kind: str = "position"  # or "zone"
 
 
 class Hub:

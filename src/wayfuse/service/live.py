@@ -18,6 +18,7 @@ from wayfuse.service.checkpoint import pack, unpack
 from wayfuse.service.live_track import LiveConfig, LiveTrack, Memory
 from wayfuse.service.message import BadBodyError, Message, Profile
 from wayfuse.service.world import World
+from wayfuse.service.zones import Crossing, ZoneState
 from wayfuse.storage.log import Entry
 from wayfuse.storage.tracks import Checkpoint, TrackRow
 from wayfuse.tracking.estimate import Estimate
@@ -38,6 +39,7 @@ class View(NamedTuple):
     ahead: float
     counts: Mapping[str, int]
     is_ended: bool
+    zones: tuple[str, ...] = ()
 
 
 class Look(NamedTuple):
@@ -50,11 +52,12 @@ class Look(NamedTuple):
 
 
 class Applied(NamedTuple):
-    """What an entry changed: the track, and the number of the first estimate that is new or was revised."""
+    """What an entry changed: the track, the first estimate that is new or was revised, zones entered and left."""
 
     seq: int
     view: View
     changed: int
+    crossings: tuple[Crossing, ...] = ()
 
 
 def profile_json(profile: Profile, map_version: int) -> str:
@@ -78,11 +81,22 @@ def read_entry(entry: Entry) -> Message:
     return messages[0]
 
 
+_NOWHERE = ZoneState()
+
+
+def _checked(kept: Any, track: str) -> tuple[Memory, ZoneState]:
+    match kept:
+        case (Memory() as memory, ZoneState() as zones):
+            return memory, zones
+    raise FormatError("a checkpoint that is no memory of a track", where=track)
+
+
 @dataclass(slots=True)
 class _Held:
     row: TrackRow
     track: LiveTrack
     is_dirty: bool = True
+    zones: ZoneState = _NOWHERE
     seq: int = 0  # up to where the log is in the checkpoint it came from
 
 
@@ -135,7 +149,10 @@ class Live:
                 self.counts["entries that failed"] += 1
                 _log.exception("entry %d of the log failed", entry.seq)
                 return None
-            return Applied(entry.seq, self._view(held), changed)
+            zones = self._worlds[entry.site].zones
+            said = held.track.undrained()[max(0, changed - held.track.first) :]
+            held.zones, crossings = zones.step(held.zones, said)
+            return Applied(entry.seq, self._view(held), changed, tuple(crossings))
 
     def _of(self, entry: Entry) -> _Held:
         """The track of an entry: in memory, from its checkpoint, or new."""
@@ -161,15 +178,15 @@ class Live:
             return None
         row, state, seq = kept
         try:
-            memory = unpack(state)
+            memory, zones = _checked(unpack(state), track)
         except FormatError as error:
             self.counts["checkpoints of another version"] += 1
             _log.warning("track %s begins anew: %s", track, error)
             return None
-        if not isinstance(memory, Memory):
-            raise FormatError("a checkpoint that is no memory of a track", where=track)
         tracker = self._worlds[row.site].tracker(row.map_version)
-        return _Held(row, LiveTrack.recall(tracker, memory, self._config), is_dirty=False, seq=seq)
+        return _Held(
+            row, LiveTrack.recall(tracker, memory, self._config), is_dirty=False, zones=zones, seq=seq
+        )
 
     def load(self, track: str) -> bool:
         """Bring a track from its checkpoint into memory; whether there is such a track."""
@@ -188,7 +205,7 @@ class Live:
             for held in [self._held[track] for track in tracks if track in self._held]:
                 if held.is_dirty:
                     first, settled = held.track.drain()
-                    out.append(Checkpoint(held.row, first, settled, pack(held.track.memory())))
+                    out.append(Checkpoint(held.row, first, settled, pack((held.track.memory(), held.zones))))
                     held.is_dirty = False
             return out
 
@@ -238,9 +255,9 @@ class Live:
                 return None
             return Look(self._view(held), held.track.first, held.track.undrained(), is_live)
 
-    @staticmethod
-    def _view(held: _Held) -> View:
+    def _view(self, held: _Held) -> View:
         track = held.track
         number = track.first + len(track.undrained()) - 1
         counts = dict(track.counts) | track.verdicts
-        return View(held.row, track.latest, number, track.ahead, counts, track.is_ended)
+        zones = self._worlds[held.row.site].zones.names(held.zones)
+        return View(held.row, track.latest, number, track.ahead, counts, track.is_ended, zones)

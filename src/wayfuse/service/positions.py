@@ -7,9 +7,10 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 from wayfuse.maps.site import Site
+from wayfuse.service.zones import Crossing
 from wayfuse.tracking.estimate import Estimate
 
-__all__ = ["Json", "collection", "feature"]
+__all__ = ["Json", "collection", "feature", "told"]
 
 Json = dict[str, Any]
 
@@ -52,6 +53,18 @@ def feature(site: Site, e: Estimate, more: Mapping[str, Any], ahead: float = 0.0
                 "effective_particles": _finite(e.ess),
             },
         },
+    }
+
+
+def told(crossing: Crossing, ahead: float) -> Json:
+    """A zone that was entered or left: ``t`` is the phone's time, ``at`` the server's."""
+    return {
+        "event": "enter" if crossing.is_enter else "leave",
+        "zone": crossing.zone,
+        "name": crossing.name,
+        "kind": "geofence" if crossing.is_fence else "room",
+        "t": crossing.t,
+        "at": _finite(crossing.t - ahead) if math.isfinite(ahead) else None,
     }
 
 

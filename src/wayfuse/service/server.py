@@ -24,10 +24,11 @@ from wayfuse.service.live import Applied, Live, View
 from wayfuse.service.live_track import LiveConfig
 from wayfuse.service.metrics import Metrics
 from wayfuse.service.pipeline import BusyError, Pipeline, PipelineConfig, recover
-from wayfuse.service.positions import Json, feature
+from wayfuse.service.positions import Json, feature, told
 from wayfuse.service.security import Authority
 from wayfuse.service.settings import Settings
 from wayfuse.service.world import World, survey_of
+from wayfuse.service.zones import Zone, read_geofences
 from wayfuse.storage.audit import AuditLog
 from wayfuse.storage.database import open_database, take_lease
 from wayfuse.storage.devices import DeviceStore
@@ -90,6 +91,10 @@ class Server:
         self.authority = Authority(
             self.tokens, RateLimit(settings.rate_per_s, settings.rate_burst, clock), clock
         )
+        plans = {site.name: site for site in map(Site.load, (files.folder for files in sites))}
+        self._fences: dict[str, list[Zone]] = (
+            read_geofences(Path(settings.geofences), plans) if settings.geofences else {}
+        )
         self.worlds |= {world.site.name: world for world in [self._world(files) for files in sites]}
         config = LiveConfig(rewind=settings.rewind_s, spacing=settings.spacing_s)
         self.live = Live(self.worlds, self.tracks.state, config, settings.seed)
@@ -112,6 +117,7 @@ class Server:
             lambda version: self.sites.archive(site.name, version),
             method=self.settings.method,
             n_particles=self.settings.particles,
+            fences=self._fences.get(site.name, ()),
         )
         version_in_use = self.published(site.name)
         if version_in_use is not None:
@@ -192,7 +198,7 @@ class Server:
             self.tracks,
             self.clock(),
             self.settings.idle_s,
-            lambda applied: recovered.append(self._event(applied)),
+            lambda applied: recovered.extend(self._events(applied)),
         )
         self.hub = Hub(self.settings.events, kept)
         self.hub.publish([e for e in recovered if e.id > kept], next_seq - 1)
@@ -262,20 +268,26 @@ class Server:
             "n": view.number,
             "heard": view.row.heard,
             "is_ended": view.is_ended,
+            "zones": list(view.zones),
         }
         return feature(self.worlds[view.row.site].site, view.estimate, more, view.ahead)
 
-    def _event(self, applied: Applied) -> Event:
-        row = applied.view.row
+    def _events(self, applied: Applied) -> list[Event]:
+        row, ahead = applied.view.row, applied.view.ahead
+        who = {"track": row.track, "device": row.device, "site": row.site}
+        out = [
+            Event(applied.seq, row.site, row.track, msgspec.json.encode(who | told(crossing, ahead)), "zone")
+            for crossing in applied.crossings
+        ]
         body = {"changed": applied.changed, "feature": self.feature(applied.view)}
-        return Event(applied.seq, row.site, row.track, msgspec.json.encode(body))
+        return [*out, Event(applied.seq, row.site, row.track, msgspec.json.encode(body))]
 
     def _publish(self, changes: list[Applied], last: int) -> None:
         now = self.clock()
         for applied in changes:
             self.metrics.latency.observe(max(0.0, now - applied.view.row.heard))
         if self._loop is not None and not self._loop.is_closed():
-            events = [self._event(applied) for applied in changes]
+            events = [event for applied in changes for event in self._events(applied)]
             self._loop.call_soon_threadsafe(self.hub.publish, events, last)
 
     def _watch(self) -> None:

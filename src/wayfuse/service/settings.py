@@ -38,6 +38,7 @@ class Settings:
     idle_s: float = 900.0  # until a silent track leaves the memory (it stays in the database)
     retain_log_h: float = 24.0  # raw batches are deleted after
     retain_tracks_d: float = 30.0  # tracks are deleted after
+    geofences: str = ""  # GeoJSON file of areas to watch besides the rooms of the plan
     events: int = 10_000  # kept for clients that resume a stream of events
     tls_certificate: str = ""  # PEM file; with the key, the server speaks HTTPS
     tls_key: str = ""  # PEM file

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +14,7 @@ from wayfuse.presets.methods import build_method
 from wayfuse.radio.survey import Survey
 from wayfuse.radio.walk_survey import load
 from wayfuse.service.warm import warm
+from wayfuse.service.zones import Zone, Zones, rooms_of
 from wayfuse.tracking.tracker import Tracker
 
 __all__ = ["World", "survey_of"]
@@ -44,12 +45,20 @@ class World:
     Parameters
     ----------
     site : its plan. archive : gives the bytes of a version of its radio map. method : of `presets.methods`.
+    fences : besides the rooms of the plan.
     """
 
     def __init__(
-        self, site: Site, archive: Callable[[int], bytes], *, method: str = "fused", n_particles: int = 1000
+        self,
+        site: Site,
+        archive: Callable[[int], bytes],
+        *,
+        method: str = "fused",
+        n_particles: int = 1000,
+        fences: Sequence[Zone] = (),
     ) -> None:
         self.site = site
+        self.zones = Zones([*rooms_of(site), *fences])
         self._archive, self._method, self._n_particles = archive, method, n_particles
         self._trackers: dict[int, Tracker[Any]] = {}
 

@@ -67,6 +67,7 @@ POSITION: dict[str, Any] = {
         "n": 42,
         "heard": 1763801001.2,
         "is_ended": False,
+        "zones": ["Reading room"],
         "site": "museum",
         "level": "F1",
         "floor": 0,

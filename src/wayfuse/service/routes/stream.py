@@ -48,7 +48,8 @@ async def events(
     once: Annotated[bool, Query(description="End after what is there already.")] = False,
     last_event_id: Annotated[str, Header(pattern=_NUMBER)] = "",
 ) -> StreamingResponse:
-    """``position`` events; their id is the place in the log of the batch that caused them.
+    """``position`` events; their id is the place in the log of the batch that caused them. Before them come ``zone``
+    events: rooms and geofences that the batch made somebody enter or leave.
 
     A client that sends Last-Event-ID gets what it missed. Where that is no longer known, or at the first time, it gets
     a ``snapshot`` event with everybody's latest position instead.
@@ -85,7 +86,9 @@ def _snapshot(server: Server, site: str, track: str) -> bytes:
 
 
 def _line(event: Event) -> bytes:
-    return f"id: {event.id}\nevent: position\ndata: ".encode() + event.data + b"\n\n"
+    # the position comes last of its batch and has the id: who resumes in between gets all of the batch
+    number = f"id: {event.id}\n" if event.kind == "position" else ""
+    return f"{number}event: {event.kind}\ndata: ".encode() + event.data + b"\n\n"
 
 
 def _is_wanted(event: Event, site: str, track: str) -> bool:
@@ -178,4 +181,4 @@ async def _tell(socket: WebSocket, server: Server, site: str, hello: _Hello) -> 
     async for some in hub.after(last, _BEAT_S):
         for e in some:
             if _is_wanted(e, site, hello.track):
-                await socket.send_text(f'{{"type":"position","id":{e.id},"data":{e.data.decode()}}}')
+                await socket.send_text(f'{{"type":"{e.kind}","id":{e.id},"data":{e.data.decode()}}}')
