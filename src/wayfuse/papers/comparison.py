@@ -18,6 +18,7 @@ from wayfuse.evaluation.results_pool import Pooled
 from wayfuse.formats.datasets import data_root
 from wayfuse.papers.comparison_runs import Group, can_enter, run_groups, simulated_group
 from wayfuse.papers.reproduction import Reproduction, Table
+from wayfuse.papers.wifi_rtt_groups import TEST, walk_groups
 from wayfuse.presets.catalogue import METHODS, PAPERS
 
 __all__ = ["ROWS", "SEEDS", "reproduce"]
@@ -108,6 +109,10 @@ def _ipin2023(root: Path, mapper: Mapper) -> list[Group]:
     return [Group(all_of.site, all_of.survey(k), tuple(all_of.of(k))) for k in all_of.numbers]
 
 
+def _wifi_rtt(root: Path, _mapper: Mapper) -> list[Group]:
+    return walk_groups(root / "wifi-rtt", TEST)
+
+
 _COLUMNS = (
     _Column(
         "ms-indoor, development split",
@@ -118,6 +123,11 @@ _COLUMNS = (
         "ipin2023-track3",
         _ipin2023,
         "one repetition left out of the survey in turn; places of access points estimated from the survey",
+    ),
+    _Column(
+        "wifi-rtt, test loops",
+        _wifi_rtt,
+        "real ranges by round-trip time as measured, no line told; places of anchors known; no plan, an open floor",
     ),
     *(
         _Column(name, _scenario(name), f"simulated, worlds of seeds {', '.join(map(str, _WORLDS))}; {what}")

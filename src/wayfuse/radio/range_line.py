@@ -67,7 +67,7 @@ class LineGrid:
 
     offset: Spread = field(default_factory=lambda: Spread(1.0, 0.5))
     slope: Spread = field(default_factory=lambda: Spread(1.08, 0.04))
-    learning: float = 0.1
+    learning: float = 0.3
     memory: float = 120.0
     negligible: float = 7.0
     offsets: Array = field(init=False, repr=False, compare=False)
