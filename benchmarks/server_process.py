@@ -13,6 +13,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from typing import IO
 
 from wayfuse.evaluation.results_folds import gather
 from wayfuse.formats.datasets import data_root
@@ -111,11 +112,18 @@ _OPENER = urllib.request.build_opener(urllib.request.ProxyHandler({}))  # the se
 
 @contextmanager
 def serving(
-    scene: Scene, data: Path, *, core: int | None = None, start: Sequence[str] = (), **settings: object
+    scene: Scene,
+    data: Path,
+    *,
+    core: int | None = None,
+    start: Sequence[str] = (),
+    errors: IO[bytes] | None = None,
+    **settings: object,
 ) -> Iterator[Process]:
     """A server on a free port of the loopback, with as many requests as anybody likes; ends with the block.
 
-    core : the one that it may use. start : what is run instead of `wayfuse`. settings : of `service.settings`.
+    core : the one that it may use. start : what is run instead of `wayfuse`. errors : file of its log. settings :
+    of `service.settings`.
     """
     environment = {k: v for k, v in os.environ.items() if not k.startswith("WAYFUSE_SERVER_")}
     settings = {"rate_per_s": 0} | settings
@@ -123,7 +131,11 @@ def serving(
     environment |= {"PYTHONUNBUFFERED": "1", "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
     command = [sys.executable, *(start or ("-m", "wayfuse")), "serve", *scene.arguments]
     process = subprocess.Popen(
-        [*command, "--port", "0", "--data", str(data)], stdout=subprocess.PIPE, text=True, env=environment
+        [*command, "--port", "0", "--data", str(data)],
+        stdout=subprocess.PIPE,
+        stderr=errors,
+        text=True,
+        env=environment,
     )
     if core is not None:
         os.sched_setaffinity(process.pid, {core})  # threads that begin later inherit it

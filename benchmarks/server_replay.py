@@ -32,7 +32,7 @@ from wayfuse.service.replay import envelopes
 from wayfuse.service.wire import encode
 from wayfuse.tracking.estimate import Estimate
 
-__all__ = ["Compared", "compare", "posted"]
+__all__ = ["Compared", "compare", "exported", "posted", "said_of", "wait_applied"]
 
 _SEED = 11
 _COLUMNS = ("t", "x", "y", "floor", "cov_xx", "cov_xy", "cov_yy", "radius_68", "radius_95")
@@ -78,8 +78,8 @@ def compare(scene: Scene, walks: Sequence[Recording], server: Process, *, badly:
         bodies = [encode(e) for e in envelopes(walk, f"phone {badly}", walk.name, 1.0)]
         track, seq, taken = posted(server, _shuffled(bodies, draw) if badly else bodies)
         wait_applied(server, seq)
-        expected = [_said(e) for e in tracker.run(replace(walk, name=track)).estimates]
-        got = _exported(server, track)
+        expected = [said_of(e) for e in tracker.run(replace(walk, name=track)).estimates]
+        got = exported(server, track)
         batches, records = batches + len(bodies), records + taken
         estimates += len(expected)
         differing += sum(a != b for a, b in zip(got, expected, strict=False)) + abs(len(got) - len(expected))
@@ -107,14 +107,16 @@ def wait_applied(server: Process, seq: int) -> None:
         time.sleep(0.01)
 
 
-def _exported(server: Process, track: str) -> list[tuple[object, ...]]:
+def exported(server: Process, track: str) -> list[tuple[object, ...]]:
+    """All estimates of a track as the server gives them out."""
     rows = csv.DictReader(io.StringIO(server.get(f"/api/v1/tracks/{track}/export?format=csv").decode()))
     return [
         (*(float(r[n]) for n in _COLUMNS), r["state"], int(r["steps"]), int(r["access_points"])) for r in rows
     ]
 
 
-def _said(e: Estimate) -> tuple[object, ...]:
+def said_of(e: Estimate) -> tuple[object, ...]:
+    """An estimate in the order of `exported`."""
     return (*map(float, e[:9]), e.state.value, e.n_steps, e.n_aps)
 
 
