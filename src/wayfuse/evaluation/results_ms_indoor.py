@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, fields
 from typing import Any
 
 from wayfuse.evaluation.errors import Scores
@@ -84,8 +84,9 @@ def _describe(folds: Folds, fold: int) -> dict[str, Any]:
 
 def _changed() -> dict[str, Any]:
     """What the random walk has other than ``fused``."""
-    plain, other = asdict(fused.Config()), asdict(baselines.RANDOM_WALK)
-    return {name: value for name, value in other.items() if value != plain[name]}
+    plain, other = fused.Config(), baselines.RANDOM_WALK
+    names = (f.name for f in fields(fused.Config) if getattr(other, f.name) != getattr(plain, f.name))
+    return {name: getattr(other, name) for name in names}
 
 
 def _comparisons(of: Mapping[str, Pooled], draw: Bootstrap) -> list[dict[str, Any]]:
