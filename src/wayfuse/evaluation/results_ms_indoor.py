@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, fields
+from dataclasses import asdict, fields, is_dataclass
 from typing import Any
 
 from wayfuse.evaluation.errors import Scores
@@ -51,7 +51,7 @@ def measure_ms_indoor(
         "n_notes": folds.n_notes,
         "seeds": list(seeds),
         "bootstrap": asdict(draw),
-        "parameters": {"fused": asdict(fused.Config()), "random-walk": _changed()},
+        "parameters": {"fused": _stated(fused.Config()), "random-walk": _changed()},
         "figures": {name: figures_of_all(name, of, draw, mapper) for name, of in sets.items()},
         "comparisons": {name: _comparisons(sets[name], draw) for name in shown},
         "coverage": {
@@ -86,7 +86,14 @@ def _changed() -> dict[str, Any]:
     """What the random walk has other than ``fused``."""
     plain, other = fused.Config(), baselines.RANDOM_WALK
     names = (f.name for f in fields(fused.Config) if getattr(other, f.name) != getattr(plain, f.name))
-    return {name: getattr(other, name) for name in names}
+    return {name: _stated(getattr(other, name)) for name in names}
+
+
+def _stated(value: Any) -> Any:
+    """A configuration as plain values, without what it derives from them."""
+    if not is_dataclass(value):
+        return value
+    return {f.name: _stated(getattr(value, f.name)) for f in fields(value) if f.init}
 
 
 def _comparisons(of: Mapping[str, Pooled], draw: Bootstrap) -> list[dict[str, Any]]:
