@@ -43,11 +43,17 @@ def create_app(server: Server) -> FastAPI:
         n = await run_in_threadpool(server.start, asyncio.get_running_loop())
         if n:
             _log.info("%d entries of the log read again", n)
-        cleaning = asyncio.create_task(_clean(server))
+        tasks = [asyncio.create_task(_clean(server))]
+        if server.settings.mqtt:
+            from wayfuse.service.mqtt import keep_connected
+
+            tasks.append(asyncio.create_task(keep_connected(server)))
         yield
-        cleaning.cancel()
-        with suppress(asyncio.CancelledError):
-            await cleaning
+        for task in tasks:
+            task.cancel()
+        for task in tasks:
+            with suppress(asyncio.CancelledError):
+                await task
         server.hub.close()
         await run_in_threadpool(server.stop)
 

@@ -23,6 +23,7 @@ from wayfuse.service.limits import RateLimit
 from wayfuse.service.live import Applied, Live, View
 from wayfuse.service.live_track import LiveConfig
 from wayfuse.service.metrics import Metrics
+from wayfuse.service.mqtt_topics import broker_of
 from wayfuse.service.pipeline import BusyError, Pipeline, PipelineConfig, recover
 from wayfuse.service.positions import Json, feature, told
 from wayfuse.service.security import Authority
@@ -75,6 +76,8 @@ class Server:
                 where="method",
                 remedy=f"use one of {', '.join([*CONFIGS, *FIXES])}",
             )
+        if settings.mqtt:
+            broker_of(settings.mqtt)  # a mistake in it ends the start, not the connection
         self.settings, self.clock = settings, clock
         data = Path(settings.data)
         data.mkdir(mode=0o700, parents=True, exist_ok=True)

@@ -39,6 +39,11 @@ class Settings:
     retain_log_h: float = 24.0  # raw batches are deleted after
     retain_tracks_d: float = 30.0  # tracks are deleted after
     geofences: str = ""  # GeoJSON file of areas to watch besides the rooms of the plan
+    mqtt: str = ""  # URL of a broker, mqtt://USER:PASSWORD@HOST:PORT or mqtts://; empty: none
+    mqtt_prefix: str = "wayfuse"  # first level of the topics
+    mqtt_discovery: str = (
+        "homeassistant"  # where Home Assistant looks for new devices; empty: tell it nothing
+    )
     events: int = 10_000  # kept for clients that resume a stream of events
     tls_certificate: str = ""  # PEM file; with the key, the server speaks HTTPS
     tls_key: str = ""  # PEM file
@@ -53,6 +58,8 @@ class Settings:
                 raise ConfigError(f"{name} must not be negative, got {getattr(self, name)}", where=name)
         if not 0 <= self.port <= 65_535:
             raise ConfigError(f"port must be 0 to 65535, got {self.port}", where="port")
+        if not self.mqtt_prefix or set("#+") & set(self.mqtt_prefix + self.mqtt_discovery):
+            raise ConfigError("mqtt_prefix must be a topic without wildcards", where="mqtt_prefix")
         if bool(self.tls_certificate) != bool(self.tls_key):
             raise ConfigError("tls_certificate and tls_key go together", where="tls_key")
 

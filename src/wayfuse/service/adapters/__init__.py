@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from types import MappingProxyType
 
-from wayfuse.service.adapters import anchors, find3, getsensordata, own, sensor_logger
+from wayfuse.service.adapters import anchors, espresense, find3, getsensordata, own, sensor_logger
 from wayfuse.service.message import Adapter
 
 __all__ = ["ADAPTERS"]
@@ -17,5 +17,6 @@ ADAPTERS: Mapping[str, Adapter] = MappingProxyType(
         "find3": find3.Find3(),
         "getsensordata": getsensordata.GetSensorData(),
         "anchors": anchors.Anchors(),
+        "espresense": espresense.Espresense(),
     }
 )
