@@ -202,6 +202,9 @@ def test_files_of_a_track(app: Any, walked: Walked) -> None:
     points = ET.fromstring(gpx.text).findall(".//{http://www.topografix.com/GPX/1/1}trkpt")  # noqa: S314
     assert len(points) == len(text.splitlines()) - 1
     assert all(abs(float(p.attrib["lat"])) <= 90.0 for p in points)
+    moving = app.get(f"/api/v1/tracks/{walked['track']}/export?format=mf-json")
+    assert moving.headers["content-disposition"].endswith('.mf.json"')
+    assert len(moving.json()["temporalGeometry"]["coordinates"]) > 10
 
 
 def test_metrics_health_and_sites(app: Any, walked: Walked) -> None:

@@ -11,7 +11,7 @@ from fastapi import APIRouter, Depends, Query, Request
 from fastapi.responses import Response
 
 from wayfuse.service.access import SCHEME, allowed, server_of, site_of
-from wayfuse.service.export import to_csv, to_gpx
+from wayfuse.service.export import to_csv, to_gpx, to_mf_json
 from wayfuse.service.live import Look, View
 from wayfuse.service.positions import collection, feature
 from wayfuse.service.problems import Problem, responses
@@ -35,7 +35,8 @@ _TRACK = re.compile("[0-9a-f]{16}")  # databases refuse some characters
 _FEATURES: dict[int | str, dict[str, Any]] = {
     200: {"content": {"application/json": {"example": {"type": "FeatureCollection", "features": [POSITION]}}}}
 }
-_MEDIA = {"csv": "text/csv; charset=utf-8", "gpx": "application/gpx+xml"}
+_MEDIA = {"csv": "text/csv; charset=utf-8", "gpx": "application/gpx+xml", "mf-json": "application/geo+json"}
+_WRITERS = {"gpx": to_gpx, "mf-json": to_mf_json}
 
 
 @router.get("/sites", summary="Sites that are served")
@@ -130,18 +131,18 @@ def export(
     request: Request,
     token: Reader,
     track: str,
-    format: Literal["csv", "gpx"] = "csv",  # noqa: A002 (a word of the address)
+    format: Literal["csv", "gpx", "mf-json"] = "csv",  # noqa: A002 (a word of the address)
     since: Time = None,
     until: Time = None,
 ) -> Response:
-    """CSV with everything, or GPX 1.1."""
+    """CSV with everything, GPX 1.1, or OGC MF-JSON."""
     server = server_of(request)
     look = _look(server, token, track)
     row = look.view.row
     site = server.worlds[row.site].site
     said = [e for _, e in _estimates(server, look, since, until)]
-    text = to_csv(site, said) if format == "csv" else to_gpx(site, said, track)
-    headers = {"Content-Disposition": f'attachment; filename="{row.track}.{format}"'}
+    text = to_csv(site, said) if format == "csv" else _WRITERS[format](site, said, track)
+    headers = {"Content-Disposition": f'attachment; filename="{row.track}.{format.replace("-", ".")}"'}
     return Response(text, media_type=_MEDIA[format], headers=headers)
 
 
