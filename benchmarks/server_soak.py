@@ -42,7 +42,7 @@ __all__ = ["Sample", "soak"]
 
 _SEED = 5
 _SHM = Path("/dev/shm")  # noqa: S108 (the folder itself)
-_PRESENT = 1.0  # visitors, on average over the day
+_PRESENT = 0.3  # visitors, on average over the day
 _CLEAN_S = 600.0  # as `service.app`
 _SAMPLE_S = 1800.0
 _SETTLED_H = 8.0  # from then on nothing may grow: tracks are kept for six hours

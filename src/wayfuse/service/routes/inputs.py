@@ -2,37 +2,45 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from typing import Any
 
-from fastapi import APIRouter, Depends, Query, Request
+from fastapi import APIRouter, Request
+from fastapi.datastructures import QueryParams
 from fastapi.responses import JSONResponse, PlainTextResponse, Response
 from pydantic import BaseModel
 
-from wayfuse.service.access import SCHEME, allowed, client_of, server_of, site_of
-from wayfuse.service.ingest import Accepted, ingest
+from wayfuse.formats.sensor_logger import PLATFORMS
+from wayfuse.service.access import SCHEME, client_of, server_of, site_of
+from wayfuse.service.ingest import ingest
 from wayfuse.service.limits import read_body
 from wayfuse.service.message import Profile, SayToUserError
 from wayfuse.service.problems import Problem, responses
 from wayfuse.service.routes.examples import EXAMPLES
-from wayfuse.storage.tokens import Token
+from wayfuse.service.security import bearer
+from wayfuse.service.wire import encode
 
 __all__ = ["router"]
 
 router = APIRouter(tags=["in"])
 
 _UPLOADS = {"getsensordata"}
+_OK = 200
 _SAY_TO_USER = 499  # Sensor Logger shows the text of this answer on the phone
 _MEDIA = {"getsensordata": "text/plain"}
 _REFUSALS = responses(400, 401, 403, 408, 413, 415, 422, 429, 503)
 
-Site = Annotated[str, Query(max_length=200, description="Name of the site; not needed where there is one.")]
-Device = Annotated[str, Query(max_length=200, description="Name of the phone, for bodies that have none.")]
-Track = Annotated[str, Query(max_length=200, description="Name of the session, for bodies that have none.")]
-Platform = Annotated[
-    str,
-    Query(pattern="^(android|ios)?$", description="Whose axes, where the body does not say: android or ios."),
-]
-Standardised = Annotated[bool, Query(description="Whether the app converts to Android's axes.")]
+# read by hand, not by dependencies: these are the addresses that are asked thousands of times a second
+_PARAMETERS: dict[str, tuple[dict[str, Any], str]] = {
+    "site": ({"type": "string", "maxLength": 200}, "Name of the site; not needed where there is one."),
+    "device": ({"type": "string", "maxLength": 200}, "Name of the phone, for bodies that have none."),
+    "track": ({"type": "string", "maxLength": 200}, "Name of the session, for bodies that have none."),
+    "platform": (
+        {"type": "string", "enum": ["", *PLATFORMS]},
+        "Whose axes, where the body does not say: android or ios.",
+    ),
+    "standardised": ({"type": "boolean", "default": False}, "Whether the app converts to Android's axes."),
+}
+_YES, _NO = {"1", "true", "yes", "on"}, {"", "0", "false", "no", "off"}
 
 
 class AcceptedMessage(BaseModel):
@@ -50,26 +58,62 @@ class AcceptedBody(BaseModel):
     accepted: list[AcceptedMessage]
 
 
-_INGEST = Depends(allowed("ingest"))
-_SCHEME = Depends(SCHEME)
-
-
 def _described(adapter: str) -> dict[str, Any]:
     media = _MEDIA.get(adapter, "application/json")
     example = {"example": EXAMPLES[adapter]}
     schema = {"type": "string"} if media == "text/plain" else {"type": "object"}
-    return {"requestBody": {"required": True, "content": {media: {"schema": schema, **example}}}}
+    parameters = [
+        {"name": name, "in": "query", "required": False, "schema": schema, "description": what}
+        for name, (schema, what) in _PARAMETERS.items()
+    ]
+    return {
+        "requestBody": {"required": True, "content": {media: {"schema": schema, **example}}},
+        "parameters": parameters,
+        "security": [{SCHEME.scheme_name: []}],
+    }
 
 
-async def _take(request: Request, token: Token, adapter: str, site: str, profile: Profile) -> list[Accepted]:
-    server = server_of(request)
+async def _take(request: Request, text: str, adapter: str) -> Response:
+    """Take a request's body, with a token of this text."""
+    server, query = server_of(request), request.query_params
+    named = query.get("site", "")
+    token = await server.authority.token(text, "ingest", named, client_of(request))
+    profile = _profile(query)
     limit = server.settings.max_upload_bytes if adapter in _UPLOADS else server.settings.max_body_bytes
     body = await read_body(request, limit)
-    return await ingest(server, site_of(server, token, site), adapter, body, profile)
+    try:
+        accepted = await ingest(server, site_of(server, token, named), adapter, body, profile)
+    except SayToUserError as error:
+        if adapter != "sensor-logger":
+            raise
+        return PlainTextResponse(f"{error.what}: {error.remedy}", _SAY_TO_USER)
+    said = encode({"accepted": [a._asdict() for a in accepted]})
+    return Response(said, media_type="application/json")
 
 
-def _answer(accepted: list[Accepted]) -> AcceptedBody:
-    return AcceptedBody(accepted=[AcceptedMessage(**a._asdict()) for a in accepted])
+def _profile(query: QueryParams) -> Profile:
+    """What the address says of a body.
+
+    Raises
+    ------
+    Problem : 422, a parameter is none of those that are described.
+    """
+    if not query:
+        return _NOTHING
+    for name in ("site", "device", "track"):
+        if len(query.get(name, "")) > _PARAMETERS[name][0]["maxLength"]:
+            raise Problem(
+                422, f"{name}: longer than {_PARAMETERS[name][0]['maxLength']}", "see /openapi.json"
+            )
+    platform, standardised = query.get("platform", ""), query.get("standardised", "").lower()
+    if platform not in {"", *PLATFORMS}:
+        raise Problem(422, "platform must be android or ios", "see /openapi.json")
+    if standardised not in _YES | _NO:
+        raise Problem(422, "standardised must be true or false", "see /openapi.json")
+    return Profile(query.get("device", ""), query.get("track", ""), platform, standardised in _YES)
+
+
+_NOTHING = Profile()
 
 
 def _add(adapter: str, summary: str) -> None:
@@ -83,24 +127,9 @@ def _add(adapter: str, summary: str) -> None:
         responses=_REFUSALS
         | ({_SAY_TO_USER: {"content": {"text/plain": {}}}} if adapter == "sensor-logger" else {}),
         openapi_extra=_described(adapter),
-        dependencies=[_SCHEME],
     )
-    async def post(
-        request: Request,
-        token: Annotated[Token, _INGEST],
-        site: Site = "",
-        device: Device = "",
-        track: Track = "",
-        platform: Platform = "",
-        standardised: Standardised = False,
-    ) -> Any:
-        profile = Profile(device, track, platform, standardised)
-        try:
-            return _answer(await _take(request, token, adapter, site, profile))
-        except SayToUserError as error:
-            if adapter != "sensor-logger":
-                raise
-            return PlainTextResponse(f"{error.what}: {error.remedy}", _SAY_TO_USER)
+    async def post(request: Request) -> Response:
+        return await _take(request, bearer(request), adapter)
 
 
 _add("own", "The own envelope: raw samples, scans and ranges of a phone")
@@ -117,18 +146,8 @@ async def post_by_path(request: Request, token: str, way: str) -> Response:
     """For clients that send no header: the token in the address. ``data`` and ``passive`` are FIND3's own words."""
     if way not in _BY_PATH:
         raise Problem(404, "no such way in", f"use one of {', '.join(_BY_PATH)}")
-    server, query = server_of(request), request.query_params
-    site = query.get("site", "")
-    found = await server.authority.token(token, "ingest", site, client_of(request))
-    platform = query.get("platform", "")
-    if platform not in {"", "android", "ios"}:
-        raise Problem(422, "platform must be android or ios")
-    is_standardised = query.get("standardised", "").lower() in {"1", "true", "yes"}
-    profile = Profile(query.get("device", "")[:200], query.get("track", "")[:200], platform, is_standardised)
-    try:
-        accepted = await _take(request, found, _BY_PATH[way], site, profile)
-    except SayToUserError as error:
-        return PlainTextResponse(f"{error.what}: {error.remedy}", _SAY_TO_USER)
-    if _BY_PATH[way] == "find3":
+    adapter = _BY_PATH[way]
+    answer = await _take(request, token, adapter)
+    if adapter == "find3" and answer.status_code == _OK:
         return JSONResponse({"success": True, "message": "inserted data"})
-    return JSONResponse(_answer(accepted).model_dump())
+    return answer
