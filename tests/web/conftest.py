@@ -55,7 +55,7 @@ def house(tmp_path_factory: pytest.TempPathFactory) -> House:
     from wayfuse.simulator.house_demo import house_scenario, write_house_demo
 
     folder = tmp_path_factory.mktemp("house")
-    demo = write_house_demo(folder, 0, replace(house_scenario(), survey_walks=6, test_walks=1))
+    demo = write_house_demo(folder, 0, replace(house_scenario(), survey_walks=3, test_walks=1))
     site, _ = import_site(demo.plan)
     site.save(folder / "SITE")
     walks = [survey_walk(site, read(path))[0] for path in demo.survey]

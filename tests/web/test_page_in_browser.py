@@ -250,3 +250,19 @@ def test_a_place_is_recorded_by_a_press_on_the_map(look: Callable[..., Any], ser
     page.page.click("#view-survey details:has(.parts) summary")
     page.page.click("text=Delete")
     page.until(lambda: "0 walks by hand" in page.page.inner_text("#view-survey"))
+
+    page.page.get_by_role("button", name="Walk", exact=True).click()
+    page.page.mouse.click(*at)
+    assert not page.page.is_visible("text=Finish")  # one place is no way
+    page.page.wait_for_timeout(300)
+    page.page.mouse.click(at[0] + 100, at[1])
+    push(9)
+    page.page.click("text=Finish")
+    page.until(lambda: "1 walks by hand" in page.page.inner_text("#view-survey"))
+    with served.client() as client:
+        (walk,) = client.get("/api/v1/survey").json()["walks"]
+    first, last = walk["taps"]
+    assert last["x"] > first["x"] + 1.0
+    assert last["t"] > first["t"]
+    page.page.click("text=Delete")
+    page.until(lambda: "0 walks by hand" in page.page.inner_text("#view-survey"))

@@ -9,10 +9,13 @@ from dataclasses import replace
 from typing import Any
 
 import pytest
+from service_running import running
 
 from wayfuse.formats.reading import read
 from wayfuse.service.replay import envelopes
 from wayfuse.service.wire import encode
+
+pytestmark = pytest.mark.slow  # a server in a process of its own, and radio maps that are built
 
 
 @pytest.fixture(scope="module")
@@ -106,9 +109,9 @@ def test_a_survey_by_phone_and_map_gives_a_radio_map_that_tracks(
     assert _built(client)["state"] == "failed"  # there is nothing yet
     token = client.post("/api/v1/tokens", json={"scopes": ["ingest"]}).json()["token"]
     address = f"/in/{token}/survey"
-    walked = [_survey_by_hand(client, address, p, f"surveyor {k}") for k, p in enumerate(house.survey[:6])]
+    walked = [_survey_by_hand(client, address, p, f"surveyor {k}") for k, p in enumerate(house.survey[:4])]
     uploaded = []
-    for path in house.survey[6:]:
+    for path in house.survey[4:]:
         answer = client.post(
             "/api/v1/survey/recordings", params={"name": path.name}, content=path.read_bytes()
         )
@@ -205,3 +208,21 @@ def test_the_map_library_is_sent_packed_and_once(client: Any) -> None:
     assert (again.status_code, again.content) == (304, b"")
     assert client.get("/").headers["cache-control"] == "no-store"
     assert client.get("/").headers["content-security-policy"] == packed.headers["content-security-policy"]
+
+
+def test_a_site_without_a_radio_map_is_surveyed_from_nothing(house: Any, tmp_path: Any) -> None:
+    with running(house.folder, tmp_path / "data", particles=100) as server, server.client() as client:
+        nothing = client.get("/api/v1/survey/coverage?floor=1").json()
+        assert (nothing["version"], nothing["fingerprints"]) == (None, 0)
+        assert len(nothing["next"]) == 5
+        refused = client.get("/api/v1/survey/access-points")
+        assert refused.status_code == 422
+        assert "no radio map" in refused.json()["error"]
+        token = client.post("/api/v1/tokens", json={"scopes": ["ingest"]}).json()["token"]
+        for k, path in enumerate(house.survey[:2]):
+            _survey_by_hand(client, f"/in/{token}/survey", path, f"surveyor {k}")
+        job = _built(client)
+        assert job["state"] == "done", job
+        client.post("/api/v1/radio-maps/publish", json={"version": job["result"]["version"]})
+        found = client.get("/api/v1/survey/coverage?floor=0").json()
+        assert (found["version"], found["fingerprints"] > 10) == (1, True)
