@@ -33,7 +33,7 @@ from wayfuse.sensors.quality import ReadReport
 from wayfuse.sensors.recording import Recording
 from wayfuse.sensors.records import CsiFrame
 
-__all__ = ["N_GROUPS", "Head", "is_log", "read"]
+__all__ = ["N_GROUPS", "Head", "frames_of", "is_log", "read"]
 
 N_GROUPS = 30  # groups of subcarriers
 _CSI = 0xBB
@@ -113,13 +113,7 @@ def read(path: str | Path, *, anchor: int = 0) -> Recording:
     """
     path = Path(path)
     report = ReadReport(path=str(path))
-    frames: list[CsiFrame] = []
-    clock = CardClock()
-    for number, head, payload in _records(read_bounded(path, _MOST_BYTES), report):
-        t, noise = clock.seconds(head.timestamp_low), float(head.noise if head.noise != _NO_NOISE else "nan")
-        if frames and t < frames[-1].t:
-            report.add("a clock that steps back", number)
-        frames.append(CsiFrame(t, anchor, _decode(head, payload), head.rss, float(head.agc), noise))
+    frames = frames_of(read_bounded(path, _MOST_BYTES), report, anchor=anchor)
     if not frames:
         raise FormatError(
             "no record of channel state", where=path, remedy="give a log of the CSI Tool, or leave it out"
@@ -127,6 +121,18 @@ def read(path: str | Path, *, anchor: int = 0) -> Recording:
     report.n_records["CSI"] = len(frames)
     frames.sort(key=lambda frame: frame.t)
     return Recording(path.stem, csi=tuple(frames), clock="network card", path=str(path), report=report)
+
+
+def frames_of(data: bytes, report: ReadReport, *, anchor: int = 0) -> list[CsiFrame]:
+    """The frames of records in a row, as they come; what is damaged is counted in ``report``, as by `read`."""
+    frames: list[CsiFrame] = []
+    clock = CardClock()
+    for number, head, payload in _records(data, report):
+        t, noise = clock.seconds(head.timestamp_low), float(head.noise if head.noise != _NO_NOISE else "nan")
+        if frames and t < frames[-1].t:
+            report.add("a clock that steps back", number)
+        frames.append(CsiFrame(t, anchor, _decode(head, payload), head.rss, float(head.agc), noise))
+    return frames
 
 
 def _records(data: bytes, report: ReadReport) -> Iterator[tuple[int, Head, bytes]]:

@@ -12,6 +12,7 @@ from fastapi.concurrency import run_in_threadpool
 from sqlalchemy.exc import SQLAlchemyError
 
 from wayfuse import __version__
+from wayfuse.service.csi_stream import listen_for_csi
 from wayfuse.service.problems import handle_problems
 from wayfuse.service.routes import (
     admin,
@@ -48,6 +49,9 @@ def create_app(server: Server) -> FastAPI:
             from wayfuse.service.mqtt import keep_connected
 
             tasks.append(asyncio.create_task(keep_connected(server)))
+        if server.settings.csi_port:
+            listener = await listen_for_csi(server)
+            tasks.append(asyncio.create_task(listener.serve_forever()))
         yield
         for task in tasks:
             task.cancel()

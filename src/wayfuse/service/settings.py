@@ -38,6 +38,7 @@ class Settings:
     idle_s: float = 900.0  # until a silent track leaves the memory (it stays in the database)
     retain_log_h: float = 24.0  # raw batches are deleted after
     retain_tracks_d: float = 30.0  # tracks are deleted after
+    csi_port: int = 0  # for streams of channel state from Intel 5300 cards; 0: none
     geofences: str = ""  # GeoJSON file of areas to watch besides the rooms of the plan
     mqtt: str = ""  # URL of a broker, mqtt://USER:PASSWORD@HOST:PORT or mqtts://; empty: none
     mqtt_prefix: str = "wayfuse"  # first level of the topics
@@ -56,8 +57,9 @@ class Settings:
         for name in ("rewind_s", "rate_per_s"):
             if not getattr(self, name) >= 0.0:
                 raise ConfigError(f"{name} must not be negative, got {getattr(self, name)}", where=name)
-        if not 0 <= self.port <= 65_535:
-            raise ConfigError(f"port must be 0 to 65535, got {self.port}", where="port")
+        for name in ("port", "csi_port"):
+            if not 0 <= getattr(self, name) <= 65_535:
+                raise ConfigError(f"{name} must be 0 to 65535, got {getattr(self, name)}", where=name)
         if not self.mqtt_prefix or set("#+") & set(self.mqtt_prefix + self.mqtt_discovery):
             raise ConfigError("mqtt_prefix must be a topic without wildcards", where="mqtt_prefix")
         if bool(self.tls_certificate) != bool(self.tls_key):

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from types import MappingProxyType
 
-from wayfuse.service.adapters import anchors, espresense, find3, getsensordata, own, sensor_logger
+from wayfuse.service.adapters import anchors, espresense, find3, getsensordata, intel5300, own, sensor_logger
 from wayfuse.service.message import Adapter
 
 __all__ = ["ADAPTERS"]
@@ -18,5 +18,6 @@ ADAPTERS: Mapping[str, Adapter] = MappingProxyType(
         "getsensordata": getsensordata.GetSensorData(),
         "anchors": anchors.Anchors(),
         "espresense": espresense.Espresense(),
+        "intel5300": intel5300.Intel5300(),
     }
 )
