@@ -50,6 +50,7 @@ cov: setup
 	NUMBA_DISABLE_JIT=1 $(VENV)/bin/python -m pytest --cov --cov-report=term-missing:skip-covered -m "not slow"
 
 bench: setup
+	UV_PROJECT_ENVIRONMENT=$(VENV) $(VENV)/bin/uv sync --locked --inexact --quiet --group bench --python $(VENV)/bin/python
 	$(VENV)/bin/python -m benchmarks
 
 results: setup
