@@ -4,15 +4,19 @@ from __future__ import annotations
 
 import math
 import re
+import tempfile
 import time
+from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from fastapi import APIRouter, Depends, Query, Request
-from fastapi.responses import Response
+from fastapi.responses import FileResponse, Response
+from starlette.background import BackgroundTask
 
 from wayfuse.service.access import SCHEME, allowed, server_of, site_of
 from wayfuse.service.export import to_csv, to_gpx, to_mf_json
 from wayfuse.service.live import Look, View
+from wayfuse.service.observations import write_observations
 from wayfuse.service.positions import collection, feature
 from wayfuse.service.problems import Problem, responses
 from wayfuse.service.routes.examples import POSITION
@@ -27,6 +31,7 @@ router = APIRouter(
     prefix="/api/v1", tags=["out"], dependencies=[Depends(SCHEME)], responses=responses(401, 403, 422, 429)
 )
 
+Administrator = Annotated[Token, Depends(allowed("admin"))]
 Reader = Annotated[Token, Depends(allowed("read"))]
 Site = Annotated[str, Query(max_length=200, description="Of this site alone.")]
 Time = Annotated[float | None, Query(description="s, of the phone's clock.", allow_inf_nan=False)]
@@ -36,6 +41,7 @@ _FEATURES: dict[int | str, dict[str, Any]] = {
     200: {"content": {"application/json": {"example": {"type": "FeatureCollection", "features": [POSITION]}}}}
 }
 _MEDIA = {"csv": "text/csv; charset=utf-8", "gpx": "application/gpx+xml", "mf-json": "application/geo+json"}
+_PARQUET = "application/vnd.apache.parquet"
 _WRITERS = {"gpx": to_gpx, "mf-json": to_mf_json}
 
 
@@ -144,6 +150,30 @@ def export(
     text = to_csv(site, said) if format == "csv" else _WRITERS[format](site, said, track)
     headers = {"Content-Disposition": f'attachment; filename="{row.track}.{format.replace("-", ".")}"'}
     return Response(text, media_type=_MEDIA[format], headers=headers)
+
+
+@router.get(
+    "/tracks/{track}/observations",
+    summary="What a track's phone sent, as Parquet",
+    response_class=FileResponse,
+    responses=responses(404)
+    | {200: {"content": {_PARQUET: {"schema": {"type": "string", "format": "binary"}}}}},
+)
+def observations(request: Request, token: Administrator, track: str) -> FileResponse:
+    """A row per record of what the log still has of the track."""
+    server = server_of(request)
+    _look(server, token, track)
+    with tempfile.NamedTemporaryFile(suffix=".parquet", delete=False) as file:
+        path = Path(file.name)
+    try:
+        write_observations(server.log.read(track=track), path)
+    except BaseException:
+        path.unlink()
+        raise
+    server.audit.add(server.clock(), token.id, "export observations", track)
+    return FileResponse(
+        path, media_type=_PARQUET, filename=f"{track}.parquet", background=BackgroundTask(path.unlink)
+    )
 
 
 def _wanted(server: Server, token: Token, site: str) -> str:
