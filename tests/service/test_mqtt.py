@@ -28,7 +28,7 @@ from wayfuse.service.replay import envelopes
 from wayfuse.service.settings import Settings
 from wayfuse.service.wire import encode
 
-REQUIRED = "WAYFUSE_REQUIRE_BROWSER"  # as of the tests of the page: programs that a test may not do without
+REQUIRED = "WAYFUSE_REQUIRE_PROGRAMS"  # as of the tests of the page: programs that a test may not do without
 
 
 class Mosquitto:

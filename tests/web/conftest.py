@@ -20,7 +20,7 @@ from wayfuse.service.wire import encode
 sys.path.append(str(Path(__file__).parent.parent / "service"))  # how a server is run is written there, once
 from service_running import Running, running, wait_until
 
-REQUIRED = "WAYFUSE_REQUIRE_BROWSER"
+REQUIRED = "WAYFUSE_REQUIRE_PROGRAMS"
 _DRAWS_WITHOUT_A_GPU = (
     "--use-angle=swiftshader",
     "--enable-unsafe-swiftshader",
