@@ -50,7 +50,20 @@ def serve(server: Server, ready: Callable[[str], None]) -> None:
     host, port = listener.getsockname()[:2]
     shown = f"[{host}]" if ":" in host else host
     ready(f"{'https' if is_tls else 'http'}://{shown}:{port}")
-    uvicorn.Server(config).run(sockets=[listener])
+    _EndingStreams(config, server).run(sockets=[listener])
+
+
+class _EndingStreams(uvicorn.Server):
+    """uvicorn, which waits for open connections when it stops: streams of events would never end by themselves."""
+
+    def __init__(self, config: uvicorn.Config, server: Server) -> None:
+        super().__init__(config)
+        self._server = server
+
+    async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
+        """End the streams, then stop."""
+        self._server.hub.close()
+        await super().shutdown(sockets)
 
 
 def _listen(host: str, port: int) -> socket.socket:
