@@ -60,5 +60,6 @@ def test_bad_bodies_among_good_ones(world: Any, tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_a_hundred_thousand_bad_bodies(world: Any, tmp_path: Path) -> None:
-    assert _fuzz(world, tmp_path, 20_000, seed=2).total() >= 100_000
+def test_thousands_of_bad_bodies(world: Any, tmp_path: Path) -> None:
+    """A hundred thousand, on a running server: ``python -m benchmarks.server_fuzz``."""
+    assert _fuzz(world, tmp_path, 1_000, seed=2).total() >= 5_000
