@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import logging
 from collections.abc import AsyncIterator
-from contextlib import asynccontextmanager, suppress
+from contextlib import asynccontextmanager
 
 from fastapi import FastAPI
 from fastapi.concurrency import run_in_threadpool
@@ -33,6 +33,7 @@ from wayfuse.service.web.surveys import Surveys
 __all__ = ["create_app"]
 
 _log = logging.getLogger(__name__)
+_AGAIN_S, _TIMES = 2.0, 4  # s between words to a task that it should end, and how many
 _CLEAN_S = 600.0  # between deletions of what is too old
 
 
@@ -53,12 +54,9 @@ def create_app(server: Server) -> FastAPI:
             listener = await listen_for_csi(server)
             tasks.append(asyncio.create_task(listener.serve_forever()))
         yield
-        for task in tasks:
-            task.cancel()
-        for task in tasks:
-            with suppress(asyncio.CancelledError):
-                await task
+        server.is_ending = True
         server.hub.close()
+        await _end(tasks)
         await run_in_threadpool(server.stop)
 
     app = FastAPI(
@@ -76,6 +74,22 @@ def create_app(server: Server) -> FastAPI:
     handle_problems(app)
     app.add_middleware(SecurityHeaders)
     return app
+
+
+async def _end(tasks: list[asyncio.Task[None]]) -> None:
+    """Cancel tasks until all are done: one that is busy with an error of its own may miss it once."""
+    for _ in range(_TIMES):
+        pending = [task for task in tasks if not task.done()]
+        for task in pending:
+            task.cancel()
+        if pending:
+            await asyncio.wait(pending, timeout=_AGAIN_S)
+    for task in tasks:
+        if not task.done():
+            _log.error("a task of the server does not end: %r", task)
+        error = task.exception() if task.done() and not task.cancelled() else None
+        if error is not None:
+            _log.error("a task of the server had ended: %r", error)
 
 
 async def _clean(server: Server) -> None:

@@ -37,16 +37,17 @@ _DEVICES = 10_000  # announced to Home Assistant and remembered
 
 
 async def keep_connected(server: Server) -> None:
-    """Be connected until cancelled."""
+    """Be connected until cancelled, or until the server ends: a connection that breaks just then hides the first."""
     broker, wait = broker_of(server.settings.mqtt), _RETRY_S[0]
-    while True:
+    while not server.is_ending:
         try:
             async with _client(broker, server.settings.mqtt_prefix) as client:
                 wait = _RETRY_S[0]
                 await _talk(client, server)
         except* aiomqtt.MqttError as errors:
             _log.warning("no connection to the MQTT broker: %s", errors.exceptions[0])
-        await asyncio.sleep(wait)
+        if not server.is_ending:
+            await asyncio.sleep(wait)
         wait = min(2.0 * wait, _RETRY_S[1])
 
 
@@ -98,7 +99,7 @@ async def _take(server: Server, topic: str, payload: object) -> None:
 async def _tell(client: aiomqtt.Client, server: Server) -> None:
     """Publish events; where they come faster than the broker takes them, some are left out."""
     known: dict[str, None] = {}
-    while True:
+    while not server.is_ending:  # an event that comes as the task is cancelled can hide that from Python 3.11
         async for some in server.hub.after(server.hub.last, _BEAT_S):
             for event in some:
                 for message in _messages(server, event, known):

@@ -102,6 +102,7 @@ class Server:
         config = LiveConfig(rewind=settings.rewind_s, spacing=settings.spacing_s)
         self.live = Live(self.worlds, self.tracks.state, config, settings.seed)
         self.hub = Hub(settings.events)
+        self.is_ending = False
         self._loop: asyncio.AbstractEventLoop | None = None
         self.pipeline: Pipeline | None = None
         self._watch()
