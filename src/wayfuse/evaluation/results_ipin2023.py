@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, replace
 from typing import Any
 
@@ -14,7 +14,7 @@ from wayfuse.evaluation.floor_changes import score_changes
 from wayfuse.evaluation.intervals import Bootstrap, compare
 from wayfuse.evaluation.results_bars import Bar, at_least, at_most
 from wayfuse.evaluation.results_folds import SEEDS, Mapper, in_turn, minutes_of
-from wayfuse.evaluation.results_pool import Pooled, figures_of_all, paired, pool, splits
+from wayfuse.evaluation.results_pool import Pooled, figures_of_all, paired, pool_known, splits
 from wayfuse.evaluation.results_repetitions import (
     METHODS,
     OFF_ROUTE,
@@ -48,7 +48,7 @@ def measure_ipin2023(
     tracked = track(repetitions, methods, seeds, mapper)
     away = track(repetitions, off_route, seeds, mapper, off_route=True)
     groups = _groups(tracked.scores)
-    off = _known(away.scores)
+    off = pool_known(away.scores)
     section: dict[str, Any] = {
         "recordings": len(repetitions.recordings),
         "minutes": minutes_of(repetitions.recordings),
@@ -76,7 +76,7 @@ def measure_ipin2023(
 def _groups(scores: Sequence[Scores]) -> dict[str, dict[str, Pooled]]:
     """Methods over all recordings, over those that stay on a floor, and over those that do not."""
     changes = np.array([key_of(walk).changes_floors for of in scores for walk in of.walks])
-    pooled = _known(scores)
+    pooled = pool_known(scores)
     wanted = {ALL: np.ones(len(changes), np.bool_), SINGLE: ~changes, CONNECTORS: changes}
     return {
         group: {name: of_walks(p, rows) for name, p in pooled.items()}
@@ -87,17 +87,7 @@ def _groups(scores: Sequence[Scores]) -> dict[str, dict[str, Pooled]]:
 
 def of_walks(pooled: Pooled, wanted: BoolArray) -> Pooled:
     """The points of the walks for which ``wanted`` (n_walks,) holds."""
-    return _each(pooled, lambda points: points.select(np.asarray(wanted[points.walk])))
-
-
-def _known(scores: Sequence[Scores]) -> dict[str, Pooled]:
-    """All methods where the truth knows the floor."""
-    return {name: _each(p, PointErrors.of_known_floor) for name, p in pool(scores).items()}
-
-
-def _each(pooled: Pooled, kept: Callable[[PointErrors], PointErrors]) -> Pooled:
-    seeds = tuple({at: kept(points) for at, points in seed.items()} for seed in pooled.seeds)
-    return replace(pooled, seeds=seeds)
+    return pooled.each(lambda points: points.select(np.asarray(wanted[points.walk])))
 
 
 def _comparison(method: Pooled, base: Pooled, draw: Bootstrap) -> dict[str, Any]:

@@ -6,7 +6,7 @@ drawn walk. Walks of different folds are different walks.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
@@ -19,7 +19,17 @@ from wayfuse.evaluation.report import survey_bins
 from wayfuse.evaluation.results_folds import Mapper, in_turn
 from wayfuse.evaluation.truth import TIMES
 
-__all__ = ["Pooled", "comparison", "coverage_of", "figures", "figures_of_all", "paired", "pool", "splits"]
+__all__ = [
+    "Pooled",
+    "comparison",
+    "coverage_of",
+    "figures",
+    "figures_of_all",
+    "paired",
+    "pool",
+    "pool_known",
+    "splits",
+]
 
 _APART = 1e10  # s between the times of seeds, beyond any clock
 
@@ -38,6 +48,11 @@ class Pooled:
     def joined(self, at: str) -> PointErrors:
         """Points of all seeds, one below the other."""
         return PointErrors.join(self.used(at))
+
+    def each(self, kept: Callable[[PointErrors], PointErrors]) -> Pooled:
+        """The same with what ``kept`` leaves of the points of each seed."""
+        seeds = tuple({at: kept(points) for at, points in seed.items()} for seed in self.seeds)
+        return replace(self, seeds=seeds)
 
 
 def pool(scores: Sequence[Scores]) -> dict[str, Pooled]:
@@ -59,6 +74,11 @@ def pool(scores: Sequence[Scores]) -> dict[str, Pooled]:
         )
         for name, seeds in parts.items()
     }
+
+
+def pool_known(scores: Sequence[Scores]) -> dict[str, Pooled]:
+    """As `pool`, where the truth knows the floor."""
+    return {name: pooled.each(PointErrors.of_known_floor) for name, pooled in pool(scores).items()}
 
 
 def figures(pooled: Pooled, at: str, draw: Bootstrap) -> dict[str, Any]:

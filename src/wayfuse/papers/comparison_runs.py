@@ -12,7 +12,7 @@ from wayfuse.core.errors import MapError
 from wayfuse.evaluation.errors import score
 from wayfuse.evaluation.estimates_file import WalkEstimates, from_track
 from wayfuse.evaluation.results_folds import Mapper
-from wayfuse.evaluation.results_pool import Pooled, pool
+from wayfuse.evaluation.results_pool import Pooled, pool_known
 from wayfuse.maps.site import Site
 from wayfuse.models.survey_walk import place_of, survey_walk
 from wayfuse.presets.catalogue import METHODS
@@ -108,13 +108,7 @@ def run_groups(
         )
         for g, group in enumerate(groups)
     ]
-    return {name: _known(pooled) for name, pooled in pool(scores).items()}
-
-
-def _known(pooled: Pooled) -> Pooled:
-    """Without the moments between two waypoints on different floors: nobody knows the floor then."""
-    seeds = tuple({at: p.select(~p.transit) for at, p in seed.items()} for seed in pooled.seeds)
-    return replace(pooled, seeds=seeds)
+    return pool_known(scores)
 
 
 class _Worker:
