@@ -139,17 +139,21 @@ def test_batches_with_ranges_go_record_by_record(tracker: Tracker[Any], world: A
     assert batch.others[Verdict.IGNORED] >= 1  # fused without anchors makes nothing of ranges
 
 
-def test_steps_of_the_phone_do_for_its_sensors(world: Any) -> None:
-    """A phone that sends steps and scans alone is tracked about as well as one that sends all its samples."""
-    recording = world.walks[0]
+def steps_of(world: Any, recording: Recording) -> tuple[Step, ...]:
+    """The steps that the walker of a simulated recording took, as a phone would send them."""
     truth = world.truth[recording.name]
-    at = truth.at(truth.contacts)
-    toward = np.diff(at, axis=0)
+    toward = np.diff(truth.at(truth.contacts), axis=0)
     rotation = world.site.anchor.rotation if world.site.anchor is not None else 0.0
-    steps = tuple(
+    return tuple(
         Step(float(t), float(np.hypot(*d)), float(np.arctan2(d[1], d[0]) + rotation))
         for t, d in zip(truth.contacts[1:], toward, strict=True)
     )
+
+
+def test_steps_of_the_phone_do_for_its_sensors(world: Any) -> None:
+    """A phone that sends steps and scans alone is tracked about as well as one that sends all its samples."""
+    recording = world.walks[0]
+    truth, steps = world.truth[recording.name], steps_of(world, recording)
     tracker = fused.build(world.site, world.survey, Config(n_particles=500))
     told = tracker.run(Recording(recording.name, steps=steps, wifi=recording.wifi), 0).estimates
     felt = tracker.run(recording, 0).estimates
@@ -161,6 +165,30 @@ def test_steps_of_the_phone_do_for_its_sensors(world: Any) -> None:
 
     assert sum(e.n_steps for e in told) == len([s for s in steps if s.t > recording.wifi[0].t])
     assert error(told) < error(felt) + 0.5
+
+
+def test_a_phone_that_sends_no_steps_any_more_stands(world: Any) -> None:
+    """Who told its steps and tells none is standing, though no sample of a sensor says so."""
+    recording = world.walks[0]
+    steps = steps_of(world, recording)[:20]
+    walked = Recording("x", steps=steps, wifi=tuple(s for s in recording.wifi if s.t < steps[-1].t))
+    tracker = fused.build(world.site, world.survey, Config(n_particles=500))
+    state, out, _, _ = tracker.extend(tracker.init("x", 0), walked)
+    _, later = tracker.flush(state, steps[-1].t + 20.0)
+    assert later[-1].t > steps[-1].t + 18.0
+    assert later[-1].r95 < out[-1].r95 + 0.1
+
+
+def test_who_tells_its_steps_is_not_moved_by_its_samples_as_well(world: Any) -> None:
+    recording = replace(world.walks[0], waypoints=())
+    steps = steps_of(world, recording)
+    tracker = fused.build(world.site, world.survey, FEW)
+    first = tracker.step(tracker.init("x", 0), steps[0])[0]
+    batch = tracker.extend(first, recording)
+    one = by_record(tracker, first, recording)
+    same(batch.state, one.state)
+    assert batch.estimates == one.estimates
+    assert batch.estimates[-1].n_steps == 0
 
 
 def test_bad_steps_have_verdicts_and_an_unknown_length_is_the_usual_one(world: Any) -> None:

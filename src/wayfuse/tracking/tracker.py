@@ -18,9 +18,8 @@ from typing import Generic, TypeVar
 
 import numpy as np
 
-from wayfuse.core.angles import wrap
 from wayfuse.core.errors import ConfigError, UsageError
-from wayfuse.inertial.front_end import InertialFrontEnd, StepEvent
+from wayfuse.inertial.front_end import InertialFrontEnd, StepEvent, StepEvents
 from wayfuse.inertial.vertical import VerticalEvent
 from wayfuse.inertial.vertical_front_end import VerticalFrontEnd
 from wayfuse.radio.scans import ScanBuffer
@@ -38,6 +37,7 @@ from wayfuse.sensors.records import (
     Waypoint,
     WifiScan,
 )
+from wayfuse.tracking import told_step
 from wayfuse.tracking.engine import Engine, Known
 from wayfuse.tracking.estimate import Estimate
 from wayfuse.tracking.track_state import FAR, LONGEST_GAP, Batch, Replay, Track, TrackState, is_even
@@ -48,11 +48,6 @@ S = TypeVar("S")
 
 _MOTION = (Acceleration, RotationRate, MagneticField, Orientation, Pressure)
 _QUIET_AFTER = 2.0  # s without motion sensors until a method diffuses (a standing phone still reports)
-_USUAL_STEP, _LONGEST_STEP, _USUAL_DURATION = (
-    0.7,
-    2.5,
-    0.55,
-)  # m, m, s: of steps that a phone worked out itself
 _LONGEST_RANGE = 1e3  # m; no radio ranges further indoors
 
 
@@ -127,6 +122,8 @@ class Tracker(Generic[S]):
         state = state._replace(front_end=front_end)
         if isinstance(record, Acceleration):
             state = state._replace(last_motion=record.t)
+        if state.is_told:
+            event = None
         if event is not None:
             state = self._step_event(state, event, out)
         if self.engine.uses_vertical:
@@ -140,8 +137,10 @@ class Tracker(Generic[S]):
         state = state._replace(vertical=vertical)
         if said is not None:
             state = self._vertical_event(state, said, out)
-        if step is None:
-            return state
+        return state if step is None else self._foot(state, step, out)
+
+    def _foot(self, state: TrackState[S], step: StepEvent, out: list[Estimate]) -> TrackState[S]:
+        """What a step tells of the movements between floors."""
         vertical, said = self.vertical.on_step(state.vertical, step)
         state = state._replace(vertical=vertical)
         return state if said is None else self._vertical_event(state, said, out)
@@ -149,21 +148,15 @@ class Tracker(Generic[S]):
     def _told(
         self, state: TrackState[S], record: Step, out: list[Estimate]
     ) -> tuple[TrackState[S], list[Estimate], Verdict]:
-        """Take a step that the phone worked out itself."""
-        if not math.isfinite(record.heading) or math.isinf(record.length):
-            return state, out, Verdict.NOT_FINITE
-        if not 0.0 <= record.length <= _LONGEST_STEP and math.isfinite(record.length):
-            return state, out, Verdict.OUT_OF_RANGE
-        length = record.length if math.isfinite(record.length) else _USUAL_STEP
-        event = StepEvent(
-            record.t, length, float(wrap(record.heading)), _USUAL_DURATION, 0.0, 0.0, 0.0, 0.0, 1.0
-        )
-        state = self._step_event(state._replace(last_motion=record.t, is_told=True), event, out)
+        """Take a step that the phone worked out itself; from then on its samples make none."""
+        verdict = told_step.judge(record)
+        if verdict is not Verdict.USED:
+            return state, out, verdict
+        event = told_step.to_event(record)
+        state = self._step_event(state._replace(is_told=True), event, out)
         if self.engine.uses_vertical:
-            vertical, said = self.vertical.on_step(state.vertical, event)
-            state = state._replace(vertical=vertical)
-            state = state if said is None else self._vertical_event(state, said, out)
-        return state, out, Verdict.USED
+            state = self._foot(state, event, out)
+        return state, out, verdict
 
     def flush(self, state: TrackState[S], until: float) -> tuple[TrackState[S], list[Estimate]]:
         """The estimates still due up to a time, and those that wait for their lag."""
@@ -230,6 +223,8 @@ class Tracker(Generic[S]):
         # whether the heading is absolute matters at scans only, so the state at the end of the stretch will do
         front_end, steps = self.front_end.run(state.front_end, recording, *within)
         state = state._replace(front_end=front_end)
+        if state.is_told:
+            steps = StepEvents(*(column[:0] for column in steps))
         vertical: list[VerticalEvent] = []
         if self.engine.uses_vertical:
             after, vertical = self.vertical.run(state.vertical, recording, steps, *within)
@@ -362,6 +357,8 @@ class Tracker(Generic[S]):
         )
 
     def _diffuse(self, state: TrackState[S], t: float) -> TrackState[S]:
+        if self.engine.uses_steps and state.is_told:  # without steps it stands
+            return state._replace(diffused=t)
         spoke = state.last_motion if self.engine.uses_steps else -np.inf
         if t - spoke <= _QUIET_AFTER:
             return state._replace(diffused=t)
