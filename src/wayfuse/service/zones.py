@@ -17,6 +17,7 @@ import numpy as np
 
 from wayfuse.core.errors import ConfigError
 from wayfuse.core.types import Array
+from wayfuse.maps.areas import distance_to_area
 from wayfuse.maps.site import Site
 from wayfuse.tracking.estimate import Estimate, State
 
@@ -123,22 +124,7 @@ class Zones:
         margin = self.config.margin_m
         near = (boxes[:, :2] <= (e.x + margin, e.y + margin)) & (boxes[:, 2:] >= (e.x - margin, e.y - margin))
         place = np.array([e.x, e.y])
-        return {some[i].id: _distance(some[i].rings, place) for i in np.flatnonzero(near.all(axis=1))}
-
-
-def _distance(rings: Sequence[Array], place: Array) -> float:
-    """Distance (m) of a place to a polygon, 0 inside; even-odd rule, so holes are outside."""
-    a = np.concatenate([ring[:-1] for ring in rings])
-    b = np.concatenate([ring[1:] for ring in rings])
-    crosses = (a[:, 1] > place[1]) != (b[:, 1] > place[1])
-    up = b[crosses] - a[crosses]
-    x = a[crosses, 0] + up[:, 0] * (place[1] - a[crosses, 1]) / up[:, 1]
-    if np.count_nonzero(x > place[0]) % 2:
-        return 0.0
-    along = b - a
-    length2 = np.maximum(np.einsum("ij,ij->i", along, along), 1e-12)
-    share = np.clip(np.einsum("ij,ij->i", place - a, along) / length2, 0.0, 1.0)
-    return float(np.hypot(*(a + share[:, None] * along - place).T).min())
+        return {some[i].id: distance_to_area(some[i].rings, place) for i in np.flatnonzero(near.all(axis=1))}
 
 
 def rooms_of(site: Site) -> list[Zone]:

@@ -8,11 +8,11 @@ import numpy as np
 from fastapi import APIRouter, Depends, Query, Request
 
 from wayfuse.core.types import Array
+from wayfuse.models.survey_coverage import Grid, coverage, heard_at, level_of, next_places
 from wayfuse.sensors.records import bssid_text
 from wayfuse.service.access import SCHEME, allowed, server_of, site_of
 from wayfuse.service.adapters.parts import identifier
 from wayfuse.service.problems import Problem, responses
-from wayfuse.service.web.coverage import Grid, coverage, heard_at, level_of, next_places
 from wayfuse.service.web.surveys import Surveys
 from wayfuse.storage.tokens import Token
 

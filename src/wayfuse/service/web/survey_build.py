@@ -6,38 +6,25 @@ import math
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from wayfuse.core.errors import WayfuseError
 from wayfuse.formats.reading import read
 from wayfuse.maps.site import Site
+from wayfuse.models.survey_rooms import RoomAccuracy, held_out_by_room
 from wayfuse.models.survey_walk import survey_walk
-from wayfuse.radio.survey import Survey
-from wayfuse.radio.survey_accuracy import held_out
 from wayfuse.radio.walk_survey import SurveyParameters, SurveyWalk, WalkRadioMap, survey_from_walks
 from wayfuse.sensors.records import WifiScan
 from wayfuse.service.adapters.parts import identifier
 from wayfuse.service.web.survey_store import Push, SurveyStore, TappedWalk
 from wayfuse.service.wire import Scan
 
-__all__ = ["Built", "Room", "build", "held_out_by_room", "tapped_walk"]
+__all__ = ["Built", "build", "tapped_walk"]
 
 _AROUND = 10.0  # s of scans kept before and after a walk
-_HELD_OUT = 1000  # fingerprints looked up again at most
 Progress = Callable[[float, str], None]
-
-
-class Room(NamedTuple):
-    """Held-out errors in a room (empty name: outside all units). median, p90 : m, wrong floors count infinite."""
-
-    level: str
-    name: str
-    n: int
-    median: float | None
-    p90: float | None
-    right_floor: float
 
 
 class Built(NamedTuple):
@@ -48,7 +35,7 @@ class Built(NamedTuple):
     access_points: int
     walks: int
     notes: list[str]
-    rooms: list[Room]
+    rooms: list[RoomAccuracy]
 
 
 def build(site: Site, store: SurveyStore, progress: Progress) -> Built:
@@ -124,41 +111,3 @@ def _recorded(site: Site, path: Path) -> tuple[SurveyWalk | None, list[str]]:
         return None, [error.what]
     walk, notes = survey_walk(site, recording)
     return walk, [*recording.report.describe(), *(note.replace(f"{path}: ", "") for note in notes)]
-
-
-def held_out_by_room(site: Site, survey: Survey) -> list[Room]:
-    """Errors of fingerprints found by the other walks, by floor and unit, most fingerprints first."""
-    found = held_out(survey, _HELD_OUT)
-    of: dict[tuple[int, str], list[float]] = {}
-    for row, error in zip(found.rows.tolist(), found.errors.tolist(), strict=True):
-        floor = int(survey.floor[row])
-        of.setdefault((floor, _unit_at(site, floor, survey.xy[row])), []).append(error)
-    rooms = [_room(site.floors[floor].name, name, errors) for (floor, name), errors in of.items()]
-    return sorted(rooms, key=lambda room: (-room.n, room.level, room.name))
-
-
-def _room(level: str, name: str, errors: list[float]) -> Room:
-    ordered = np.sort(errors)
-    median, p90 = (float(ordered[math.ceil(q * len(ordered)) - 1]) for q in (0.5, 0.9))
-    right = float(np.mean(np.isfinite(ordered)))
-    return Room(level, name, len(errors), _finite(median), _finite(p90), right)
-
-
-def _unit_at(site: Site, floor: int, xy: Any) -> str:
-    for unit in site.floors[floor].units:
-        inside = [_is_in(ring, float(xy[0]), float(xy[1])) for ring in unit.polygon.rings]
-        if inside[0] and not any(inside[1:]):
-            return unit.name or unit.category or unit.id
-    return ""
-
-
-def _is_in(ring: Any, x: float, y: float) -> bool:
-    """Whether a place lies in a closed ring (k, 2): a ray to the right meets its edges an odd number of times."""
-    x0, y0, x1, y1 = ring[:-1, 0], ring[:-1, 1], ring[1:, 0], ring[1:, 1]
-    spans = (y0 > y) != (y1 > y)
-    at = x0[spans] + (y - y0[spans]) * (x1[spans] - x0[spans]) / (y1[spans] - y0[spans])
-    return bool(np.count_nonzero(at > x) % 2)
-
-
-def _finite(value: float) -> float | None:
-    return value if math.isfinite(value) else None

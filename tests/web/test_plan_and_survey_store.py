@@ -1,4 +1,4 @@
-"""Plans as GeoJSON and pictures of a survey, by arithmetic."""
+"""Plans as GeoJSON, and what a survey collects."""
 
 from __future__ import annotations
 
@@ -9,10 +9,8 @@ import numpy as np
 import pytest
 
 from wayfuse.maps.site import Site
-from wayfuse.radio.survey import Survey
-from wayfuse.service.web.coverage import coverage, heard_at, level_of, next_places
 from wayfuse.service.web.plan import floor_features, floor_frame
-from wayfuse.service.web.survey_build import held_out_by_room, tapped_walk
+from wayfuse.service.web.survey_build import tapped_walk
 from wayfuse.service.web.survey_store import Push, SurveyStore, TappedWalk, Waypoint
 from wayfuse.service.wire import Ap, Scan
 
@@ -57,64 +55,6 @@ def test_a_floor_without_a_place_on_earth_is_drawn_in_its_own_shape(site: Site) 
     assert north[1] == pytest.approx(10.0 / 110_574.0, rel=1e-3)
 
 
-def test_coverage_is_the_distance_to_the_nearest_fingerprint(site: Site) -> None:
-    floor = site.floors[0]
-    places = floor.walkable.centres()[[0, 500, 900]]
-    grid = coverage(floor, places)
-    ny, nx = grid.values.shape
-    n = 0
-    for j in range(0, ny, 3):
-        for i in range(0, nx, 3):
-            x, y = (i + 0.5) * grid.cell, (j + 0.5) * grid.cell
-            if floor.walkable.contains(x, y):
-                assert grid.values[j, i] == pytest.approx(np.hypot(*(places - (x, y)).T).min())
-                n += 1
-            else:
-                assert np.isnan(grid.values[j, i])
-    assert n > 100
-    assert np.isinf(coverage(floor, np.empty((0, 2))).values[~np.isnan(grid.values)]).all()
-
-
-def test_the_next_places_are_far_from_fingerprints_and_from_each_other(site: Site) -> None:
-    floor = site.floors[0]
-    places = floor.walkable.centres()[:1]
-    found = next_places(floor, places)
-    xy = np.array([p[:2] for p in found])
-    assert len(found) == 5
-    assert all(floor.walkable.contains(xy[:, 0], xy[:, 1]))
-    assert found[0][2] == pytest.approx(np.nanmax(coverage(floor, places).values))
-    between = np.hypot(*(xy[:, None] - np.concatenate([places, xy])).transpose(2, 0, 1))
-    assert between[between > 0].min() >= 5.0
-    assert next_places(floor, floor.walkable.centres()) == []
-    assert np.isinf(next_places(floor, np.empty((0, 2)))[0][2])
-
-
-def test_the_level_of_an_access_point_is_that_of_the_fingerprints(site: Site) -> None:
-    floor = site.floors[0]
-    places = floor.walkable.centres()[::40]
-    levels = -40.0 - places[:, 0]
-    levels[-1] = np.nan
-    survey = Survey.from_dense(
-        np.column_stack([np.full(len(places), -50.0), levels]),
-        places,
-        np.zeros(len(places), np.int32),
-        site.floor_names,
-    )
-    xy, heard = heard_at(survey, 1, 0)
-    np.testing.assert_allclose(heard, levels, rtol=1e-6)
-    grid = level_of(floor, xy, heard)
-    spots = [
-        (int(y // grid.cell), int(x // grid.cell), level)
-        for (x, y), level in zip(places, levels, strict=True)
-    ]
-    inner = [(grid.values[j, i], level) for j, i, level in spots[10:-10] if np.isfinite(grid.values[j, i])]
-    assert len(inner) > 10
-    assert np.median([abs(a - b) for a, b in inner]) < 2.0
-    far = coverage(floor, xy).values > 5.0
-    assert np.isnan(grid.values[far]).all()
-    assert np.isnan(level_of(floor, xy, np.full(len(xy), np.nan)).values).all()
-
-
 def test_a_tapped_walk_is_put_on_the_phones_clock() -> None:
     ahead = 3600.25  # the phone's clock before the server's
     scans = [Scan(1000.0 + ahead + k, [Ap("02:00:00:00:00:01", -50.0 - k, 2412.0)]) for k in range(8)]
@@ -130,21 +70,6 @@ def test_a_tapped_walk_is_put_on_the_phones_clock() -> None:
     assert [s.t for s in walk.scans] == [s.t for s in scans]
     assert walk.scans[3].rssi.tolist() == [-53.0]
     assert tapped_walk("w", TappedWalk("0" * 16, waypoints), []).scans == ()
-
-
-def test_held_out_errors_are_told_by_room(site: Site, house: Any) -> None:
-    from wayfuse.radio.survey_accuracy import held_out
-    from wayfuse.radio.walk_survey import load
-
-    survey = load(house.folder / "map.npz").survey
-    rooms = held_out_by_room(site, survey)
-    assert sum(room.n for room in rooms) == len(held_out(survey, 1000).rows) > 100
-    assert rooms == sorted(rooms, key=lambda room: -room.n)
-    for room in rooms:
-        assert 0.0 <= room.right_floor <= 1.0
-        assert room.median is None or room.p90 is None or room.median <= room.p90
-    names = {(site.floors[i].name, u.name) for i in range(3) for u in site.floors[i].units}
-    assert {(r.level, r.name) for r in rooms if r.name} <= names
 
 
 def test_a_survey_store_keeps_what_it_is_given(tmp_path: Any) -> None:

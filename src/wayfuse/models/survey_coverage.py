@@ -1,6 +1,6 @@
 """What a survey covers of a floor, and where to survey next; how strong an access point is over a floor.
 
-Grids are those of the browser: values row by row, from the corner ``origin`` (m) on, rows along y, ``cell`` m apart.
+Grids are as a map draws them: values row by row, from the corner ``origin`` (m) on, rows along y, ``cell`` m apart.
 """
 
 from __future__ import annotations
