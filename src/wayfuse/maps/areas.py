@@ -12,7 +12,10 @@ __all__ = ["distance_to_area"]
 
 
 def distance_to_area(rings: Sequence[Array], place: Array) -> float:
-    """Distance (m) of a place (2,) to a polygon of closed rings (k, 2) m, 0 inside; even-odd rule, holes are outside."""
+    """Distance (m) of a place (2,) to a polygon of closed rings (k, 2) m.
+
+    0 inside by the even-odd rule, so that holes are outside.
+    """
     a = np.concatenate([ring[:-1] for ring in rings])
     b = np.concatenate([ring[1:] for ring in rings])
     crosses = (a[:, 1] > place[1]) != (b[:, 1] > place[1])
