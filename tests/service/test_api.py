@@ -274,8 +274,13 @@ def test_a_websocket_without_a_token_is_closed(app: Any) -> None:
 SCOPES = {
     "ingest": [("POST", "/api/v1/in/own")],
     "read": [("GET", "/api/v1/positions"), ("GET", "/api/v1/events?once=true"), ("GET", "/metrics")],
-    "survey": [("GET", "/api/v1/radio-maps"), ("PUT", "/api/v1/devices")],
-    "admin": [("GET", "/api/v1/tokens"), ("POST", "/api/v1/tokens"), ("GET", "/api/v1/audit")],
+    "survey": [("GET", "/api/v1/radio-maps"), ("PUT", "/api/v1/devices"), ("POST", "/api/v1/tokens")],
+    "admin": [
+        ("GET", "/api/v1/tokens"),
+        ("GET", "/api/v1/audit"),
+        ("POST", "/api/v1/devices/forget?name=nobody"),
+        ("GET", "/api/v1/devices/export?name=nobody"),
+    ],
 }
 
 
@@ -376,7 +381,7 @@ def test_a_forgotten_phone_is_nowhere(app: Any, world: Any) -> None:
     app.settle()
     assert app.get(f"/api/v1/tracks/{track}").status_code == 200
     path = "/api/v1/devices/forget?name=leaver"
-    assert app.post(path, {}, "admin").json() == {"tracks": 1}
+    assert app.post(path, {}, "admin").json() == {"tracks": 1, "survey_files": 0}
     assert app.get(f"/api/v1/tracks/{track}").status_code == 404
     assert not [e for e in app.server.log.read() if b"leaver" in e.body]
 

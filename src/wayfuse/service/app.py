@@ -39,13 +39,14 @@ _CLEAN_S = 600.0  # between deletions of what is too old
 
 def create_app(server: Server) -> FastAPI:
     """The application of a server; it starts and stops the server's work."""
+    surveys = Surveys(server)
 
     @asynccontextmanager
     async def life(_app: FastAPI) -> AsyncIterator[None]:
         n = await run_in_threadpool(server.start, asyncio.get_running_loop())
         if n:
             _log.info("%d entries of the log read again", n)
-        tasks = [asyncio.create_task(_clean(server))]
+        tasks = [asyncio.create_task(_clean(server, surveys))]
         if server.settings.mqtt:
             from wayfuse.service.mqtt import keep_connected
 
@@ -67,7 +68,7 @@ def create_app(server: Server) -> FastAPI:
         docs_url=None,  # both would load scripts from another host
         redoc_url=None,
     )
-    app.state.server, app.state.surveys = server, Surveys(server)
+    app.state.server, app.state.surveys = server, surveys
     web = (web_plan, web_particles, web_radio, web_survey, web_assets)
     for part in (inputs, outputs, stream, admin, pages, *web):
         app.include_router(part.router)
@@ -92,10 +93,11 @@ async def _end(tasks: list[asyncio.Task[None]]) -> None:
             _log.error("a task of the server had ended: %r", error)
 
 
-async def _clean(server: Server) -> None:
+async def _clean(server: Server, surveys: Surveys) -> None:
     while True:
         await asyncio.sleep(_CLEAN_S)
         try:
             await run_in_threadpool(server.clean)
-        except SQLAlchemyError as error:
+            await run_in_threadpool(surveys.clean)
+        except (SQLAlchemyError, OSError) as error:
             _log.error("old data cannot be deleted now: %s", type(error).__name__)

@@ -237,6 +237,7 @@ class Server:
         now = self.clock()
         self.log.trim(now - 3600.0 * self.settings.retain_log_h, self.tracks.round())
         self.tracks.trim(now - 86_400.0 * self.settings.retain_tracks_d)
+        self.audit.trim(now - 86_400.0 * self.settings.retain_audit_d)
 
     def forget(self, device: str) -> int:
         """Delete all that is kept of a device, by its pseudonym; how many tracks it had.

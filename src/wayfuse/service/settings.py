@@ -38,6 +38,10 @@ class Settings:
     idle_s: float = 900.0  # until a silent track leaves the memory (it stays in the database)
     retain_log_h: float = 24.0  # raw batches are deleted after
     retain_tracks_d: float = 30.0  # tracks are deleted after
+    retain_survey_d: float = (
+        365.0  # scans, walks and recordings of surveys are deleted after; radio maps stay
+    )
+    retain_audit_d: float = 365.0  # what was done by whom is forgotten after
     csi_port: int = 0  # for streams of channel state from Intel 5300 cards; 0: none
     geofences: str = ""  # GeoJSON file of areas to watch besides the rooms of the plan
     mqtt: str = ""  # URL of a broker, mqtt://USER:PASSWORD@HOST:PORT or mqtts://; empty: none
@@ -51,7 +55,8 @@ class Settings:
 
     def __post_init__(self) -> None:
         positive = ("particles", "max_body_bytes", "max_upload_bytes", "max_waiting", "rate_burst", "events")
-        for name in (*positive, "checkpoint_s", "spacing_s", "idle_s", "retain_log_h", "retain_tracks_d"):
+        retained = [name for name in _FIELDS if name.startswith("retain_")]
+        for name in (*positive, *retained, "checkpoint_s", "spacing_s", "idle_s"):
             if not getattr(self, name) > 0:
                 raise ConfigError(f"{name} must be positive, got {getattr(self, name)}", where=name)
         for name in ("rewind_s", "rate_per_s"):

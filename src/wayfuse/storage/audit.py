@@ -1,10 +1,13 @@
-"""Who did what: an append-only list of everything that changes who may do what, what is published, what is deleted."""
+"""Who did what: a list of everything that changes who may do what, what is published, what is deleted.
+
+Rows are added and, when they are old, deleted; never changed.
+"""
 
 from __future__ import annotations
 
 from typing import NamedTuple
 
-from sqlalchemy import Engine, insert, select
+from sqlalchemy import Engine, delete, insert, select
 
 from wayfuse.storage.schema import audit
 
@@ -38,3 +41,8 @@ class AuditLog:
         with self._engine.connect() as connection:
             rows = connection.execute(select(*columns).order_by(audit.c.id.desc()).limit(limit))
             return [AuditRow(*row) for row in rows]
+
+    def trim(self, before: float) -> int:
+        """Delete what was done before a time (Unix s); how many rows."""
+        with self._engine.begin() as connection:
+            return int(connection.execute(delete(audit).where(audit.c.at < before)).rowcount)

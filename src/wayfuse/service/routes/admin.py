@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+import re
 from typing import Annotated, Any, Literal
 
 from fastapi import APIRouter, Depends, Query, Request
 from fastapi.concurrency import run_in_threadpool
+from fastapi.responses import FileResponse
 from pydantic import BaseModel, ConfigDict, Field
 
 from wayfuse.service.access import SCHEME, allowed, server_of, site_of
 from wayfuse.service.limits import read_body
 from wayfuse.service.problems import Problem, responses
+from wayfuse.service.routes.sent_file import sent_file
+from wayfuse.service.server import Server
+from wayfuse.service.subject import write_subject
+from wayfuse.service.web.surveys import surveys_of
 from wayfuse.storage.devices import Device
 from wayfuse.storage.tokens import Token
 
@@ -25,6 +31,8 @@ router = APIRouter(
 
 Admin = Annotated[Token, Depends(allowed("admin"))]
 Surveyor = Annotated[Token, Depends(allowed("survey"))]
+_ZIP = "application/zip"
+_PSEUDONYM = re.compile("[0-9a-f]{16}")
 Text = Annotated[str, Field(max_length=200, pattern=r"^[^\x00-\x1f]*$")]
 Name = Annotated[str, Field(min_length=1, max_length=200)]
 
@@ -60,17 +68,21 @@ class Publication(BaseModel):
 
 
 @router.post("/tokens", status_code=201, summary="Make a token")
-def create_token(request: Request, admin: Admin, wanted: NewToken) -> dict[str, Any]:
-    """The answer holds the token's text, which cannot be asked for again."""
+def create_token(request: Request, maker: Surveyor, wanted: NewToken) -> dict[str, Any]:
+    """The answer holds the token's text, which cannot be asked for again. Who surveys may make tokens with the scope
+    ``ingest`` alone, for the phones that survey.
+    """
     server = server_of(request)
+    if not maker.allows("admin") and set(wanted.scopes) != {"ingest"}:
+        raise Problem(403, "this token may make tokens with the scope ingest alone", "ask an administrator")
     if wanted.site and wanted.site not in server.worlds:
         raise Problem(422, f"no site {wanted.site!r}", "see /api/v1/sites")
-    if admin.site and wanted.site != admin.site:
-        raise Problem(403, "this token may make tokens of its own site alone", f"add site={admin.site}")
+    if maker.site and wanted.site != maker.site:
+        raise Problem(403, "this token may make tokens of its own site alone", f"add site={maker.site}")
     text, made = server.tokens.create(
         wanted.scopes, server.clock(), site=wanted.site, label=wanted.label, expires=wanted.expires
     )
-    server.audit.add(server.clock(), admin.id, "create token", made.id, " ".join(sorted(made.scopes)))
+    server.audit.add(server.clock(), maker.id, "create token", made.id, " ".join(sorted(made.scopes)))
     return {"token": text, **_token(made)}
 
 
@@ -114,16 +126,38 @@ def devices(request: Request, _: Surveyor) -> dict[str, Any]:
 def forget(
     request: Request, admin: Admin, name: Annotated[str, Query(min_length=1, max_length=200)]
 ) -> dict[str, Any]:
-    """``name`` : what the phone calls itself, or its pseudonym. Its tracks, its part of the log, its enrolment."""
+    """``name`` : what the phone calls itself, or its pseudonym. Its tracks, its part of the log, its enrolment, the
+    scans it pushed for surveys and the walks tapped for it. Recordings that were uploaded do not say whose they are.
+    """
     server = server_of(request)
-    if admin.site:
-        raise Problem(403, "this token is of one site alone", "ask for one of all sites")
-    pseudonyms = {name, server.pseudonyms.device(name)}
-    n = 0
-    for device in sorted(p for p in pseudonyms if p.isalnum()):
+    _check_all_sites(admin)
+    n, files = 0, 0
+    for device in _pseudonyms(server, name):
         n += server.forget(device)
-    server.audit.add(server.clock(), admin.id, "forget device", server.pseudonyms.device(name), f"{n} tracks")
-    return {"tracks": n}
+        files += surveys_of(request).forget(device)
+    said = f"{n} tracks, {files} files of surveys"
+    server.audit.add(server.clock(), admin.id, "forget device", server.pseudonyms.device(name), said)
+    return {"tracks": n, "survey_files": files}
+
+
+@router.get(
+    "/devices/export",
+    summary="All that is kept of a phone",
+    response_class=FileResponse,
+    responses={200: {"content": {_ZIP: {"schema": {"type": "string", "format": "binary"}}}}},
+)
+def export(
+    request: Request, admin: Admin, name: Annotated[str, Query(min_length=1, max_length=200)]
+) -> FileResponse:
+    """A ZIP archive: enrolment, tracks (CSV), what the phone sent (Parquet), and what it did for surveys."""
+    server = server_of(request)
+    _check_all_sites(admin)
+    device, stores = server.pseudonyms.device(name), surveys_of(request).everywhere()
+    answer = sent_file(
+        lambda path: write_subject(server, stores, _pseudonyms(server, name), path), _ZIP, f"{device}.zip"
+    )
+    server.audit.add(server.clock(), admin.id, "export device", device)
+    return answer
 
 
 @router.get("/radio-maps", summary="Versions of a radio map")
@@ -177,9 +211,22 @@ def roll_back(request: Request, surveyor: Surveyor, site: str = "") -> dict[str,
 
 
 @router.get("/audit", summary="Who did what")
-def audit(request: Request, _: Admin, limit: Annotated[int, Query(ge=1, le=1000)] = 100) -> dict[str, Any]:
+def audit(
+    request: Request, admin: Admin, limit: Annotated[int, Query(ge=1, le=1000)] = 100
+) -> dict[str, Any]:
     """Newest first."""
+    _check_all_sites(admin)
     return {"audit": [row._asdict() for row in server_of(request).audit.newest(limit)]}
+
+
+def _pseudonyms(server: Server, name: str) -> list[str]:
+    """Under what a phone may be kept: of its name, and the name itself where it is a pseudonym already."""
+    return [server.pseudonyms.device(name), *([name] if _PSEUDONYM.fullmatch(name) else [])]
+
+
+def _check_all_sites(admin: Token) -> None:
+    if admin.site:
+        raise Problem(403, "this token is of one site alone", "ask for one of all sites")
 
 
 def _token(token: Token) -> dict[str, Any]:

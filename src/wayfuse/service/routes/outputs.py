@@ -4,26 +4,23 @@ from __future__ import annotations
 
 import math
 import re
-import tempfile
-import time
-from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from fastapi import APIRouter, Depends, Query, Request
 from fastapi.responses import FileResponse, Response
-from starlette.background import BackgroundTask
 
 from wayfuse.service.access import SCHEME, allowed, server_of, site_of
 from wayfuse.service.export import to_csv, to_gpx, to_mf_json
+from wayfuse.service.history import estimates_of
 from wayfuse.service.live import Look, View
 from wayfuse.service.observations import write_observations
 from wayfuse.service.positions import collection, feature
 from wayfuse.service.problems import Problem, responses
 from wayfuse.service.routes.examples import POSITION
+from wayfuse.service.routes.sent_file import sent_file
 from wayfuse.service.server import Server
 from wayfuse.storage.tokens import Token
 from wayfuse.storage.tracks import TrackRow
-from wayfuse.tracking.estimate import Estimate
 
 __all__ = ["router"]
 
@@ -84,9 +81,8 @@ def tracks(
     server = server_of(request)
     wanted = _wanted(server, token, site)
     views = {v.row.track: v for v in server.live.views(wanted)}
-    rows = {r.track: r for r in server.tracks.newest(limit=limit, site=wanted)} | {
-        k: v.row for k, v in views.items()
-    }
+    kept = server.tracks.newest(limit=None if device else limit, site=wanted)
+    rows = {r.track: r for r in kept} | {k: v.row for k, v in views.items()}
     of = [r for r in rows.values() if not device or r.device == device]
     newest = sorted(of, key=lambda r: (-r.heard, r.track))[:limit]
     return {"tracks": [_summary(r, views.get(r.track), is_live=r.track in views) for r in newest]}
@@ -121,7 +117,7 @@ def estimates(
     """GeoJSON of the estimates of a span of time, in order; the newest ``limit`` of them."""
     server = server_of(request)
     look = _look(server, token, track)
-    numbered = _estimates(server, look, since, until)[-limit:]
+    numbered = estimates_of(server, look, since, until)[-limit:]
     site = server.worlds[look.view.row.site].site
     return collection(feature(site, e, {"track": track, "n": n}) for n, e in numbered)
 
@@ -146,7 +142,7 @@ def export(
     look = _look(server, token, track)
     row = look.view.row
     site = server.worlds[row.site].site
-    said = [e for _, e in _estimates(server, look, since, until)]
+    said = [e for _, e in estimates_of(server, look, since, until)]
     text = to_csv(site, said) if format == "csv" else _WRITERS[format](site, said, track)
     headers = {"Content-Disposition": f'attachment; filename="{row.track}.{format.replace("-", ".")}"'}
     return Response(text, media_type=_MEDIA[format], headers=headers)
@@ -163,17 +159,11 @@ def observations(request: Request, token: Administrator, track: str) -> FileResp
     """A row per record of what the log still has of the track."""
     server = server_of(request)
     _look(server, token, track)
-    with tempfile.NamedTemporaryFile(suffix=".parquet", delete=False) as file:
-        path = Path(file.name)
-    try:
-        write_observations(server.log.read(track=track), path)
-    except BaseException:
-        path.unlink()
-        raise
-    server.audit.add(server.clock(), token.id, "export observations", track)
-    return FileResponse(
-        path, media_type=_PARQUET, filename=f"{track}.parquet", background=BackgroundTask(path.unlink)
+    answer = sent_file(
+        lambda path: write_observations(server.log.read(track=track), path), _PARQUET, f"{track}.parquet"
     )
+    server.audit.add(server.clock(), token.id, "export observations", track)
+    return answer
 
 
 def _wanted(server: Server, token: Token, site: str) -> str:
@@ -186,24 +176,6 @@ def _look(server: Server, token: Token, track: str) -> Look:
     if look is None or look.view.row.site not in server.worlds or token.site not in {"", look.view.row.site}:
         raise Problem(404, "no such track", "list them at /api/v1/tracks")
     return look
-
-
-def _estimates(
-    server: Server, look: Look, since: float | None, until: float | None
-) -> list[tuple[int, Estimate]]:
-    """Numbered estimates: those that are written, then those that are not yet."""
-    track, first = look.view.row.track, look.first
-    for _ in range(20):  # what has settled is on its way into the database
-        if server.tracks.n_estimates(track) >= first:
-            break
-        time.sleep(0.05)
-    written = server.tracks.estimates(track, since, until)
-    inside = [
-        (n, e)
-        for n, e in enumerate(look.recent, first)
-        if (since is None or e.t >= since) and (until is None or e.t <= until)
-    ]
-    return [(n, e) for n, e in written if n < first] + inside
 
 
 def _summary(row: TrackRow, view: View | None, *, is_live: bool) -> dict[str, Any]:

@@ -13,7 +13,7 @@ from wayfuse.sensors.records import bssid_text
 from wayfuse.service.access import SCHEME, allowed, server_of, site_of
 from wayfuse.service.adapters.parts import identifier
 from wayfuse.service.problems import Problem, responses
-from wayfuse.service.web.surveys import Surveys
+from wayfuse.service.web.surveys import surveys_of
 from wayfuse.storage.tokens import Token
 
 __all__ = ["router"]
@@ -42,7 +42,7 @@ def covered(
     places = np.empty((0, 2))
     known: int | None = None
     if version is not None or server.published(name) is not None:
-        known, survey = _surveys(request).of(name, version)
+        known, survey = surveys_of(request).of(name, version)
         places = survey.xy[survey.floor == floor]
     found = next_places(plan, places)
     return {
@@ -67,7 +67,7 @@ def access_points(
     """The most heard first: address, channel, and on each floor how many fingerprints heard it and how loud at most."""
     server = server_of(request)
     name = site_of(server, token, site)
-    known, survey = _surveys(request).of(name, version)
+    known, survey = surveys_of(request).of(name, version)
     n_floors, n_aps = len(survey.floors), len(survey.bssid)
     row_of = np.repeat(np.arange(len(survey)), np.diff(survey.indptr))
     pair = survey.indices.astype(np.int64) * n_floors + survey.floor[row_of]
@@ -101,7 +101,7 @@ def heat(
     server = server_of(request)
     name = site_of(server, token, site)
     plan = _floor(server.worlds[name].site.floors, floor)
-    known, survey = _surveys(request).of(name, version)
+    known, survey = surveys_of(request).of(name, version)
     column = int(survey.columns(np.array([identifier(bssid)], np.uint64))[0])
     if column < 0:
         raise Problem(
@@ -110,11 +110,6 @@ def heat(
     places, levels = heard_at(survey, column, floor)
     said = {"site": name, "floor": floor, "version": known, "bssid": bssid}
     return said | {"fingerprints": int(np.isfinite(levels).sum())} | _grid(level_of(plan, places, levels))
-
-
-def _surveys(request: Request) -> Surveys:
-    surveys: Surveys = request.app.state.surveys
-    return surveys
 
 
 def _floor(floors: tuple[Any, ...], floor: int) -> Any:

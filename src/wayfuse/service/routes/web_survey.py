@@ -22,7 +22,7 @@ from wayfuse.service.problems import Problem, responses
 from wayfuse.service.server import Server
 from wayfuse.service.web.survey_build import build
 from wayfuse.service.web.survey_store import Push, TappedWalk, Waypoint
-from wayfuse.service.web.surveys import Surveys
+from wayfuse.service.web.surveys import Surveys, surveys_of
 from wayfuse.service.wire import Ap, Scan
 from wayfuse.storage.tokens import Token
 
@@ -77,7 +77,7 @@ class NewWalk(BaseModel):
 )
 def survey(request: Request, token: Surveyor, site: Site = "") -> dict[str, Any]:
     """Phones that push scans, walks, recordings, and the last job."""
-    server, surveys = server_of(request), _surveys(request)
+    server, surveys = server_of(request), surveys_of(request)
     name = site_of(server, token, site)
     store, job = surveys.store(name), surveys.jobs.last(name)
     return {
@@ -121,7 +121,7 @@ def add_walk(request: Request, token: Surveyor, walk: NewWalk, site: Site = "") 
         raise Problem(422, "the taps are not in the order of their times", "send them as they were made")
     ahead = server.clock() - walk.now
     kept = [Waypoint(tap.t + ahead, tap.floor, tap.x, tap.y) for tap in walk.taps]
-    identifier = _surveys(request).store(name).add_walk(TappedWalk(walk.device, kept))
+    identifier = surveys_of(request).store(name).add_walk(TappedWalk(walk.device, kept))
     server.audit.add(server.clock(), token.id, "add survey walk", name, identifier)
     return {"site": name, "id": identifier}
 
@@ -149,7 +149,7 @@ async def add_recording(
     server = server_of(request)
     of = site_of(server, token, site)
     body = await read_body(request, server.settings.max_upload_bytes)
-    return await run_in_threadpool(_keep_recording, server, _surveys(request), of, name, body, token.id)
+    return await run_in_threadpool(_keep_recording, server, surveys_of(request), of, name, body, token.id)
 
 
 def _keep_recording(
@@ -181,7 +181,7 @@ def remove(request: Request, token: Surveyor, identifier: str, site: Site = "") 
     """Radio maps built with it stay as they are."""
     server = server_of(request)
     name = site_of(server, token, site)
-    if not _surveys(request).store(name).remove(identifier):
+    if not surveys_of(request).store(name).remove(identifier):
         raise Problem(404, "no such walk or recording", "list them at /api/v1/survey")
     server.audit.add(server.clock(), token.id, "remove survey part", name, identifier)
     return {"removed": identifier}
@@ -196,7 +196,7 @@ def remove(request: Request, token: Surveyor, identifier: str, site: Site = "") 
 )
 def start_job(request: Request, token: Surveyor, site: Site = "") -> dict[str, Any]:
     """The job's result names the new version, which is not yet published, and its held-out errors room by room."""
-    server, surveys = server_of(request), _surveys(request)
+    server, surveys = server_of(request), surveys_of(request)
     name = site_of(server, token, site)
     plan, store = server.worlds[name].site, surveys.store(name)
 
@@ -219,7 +219,7 @@ def start_job(request: Request, token: Surveyor, site: Site = "") -> dict[str, A
 )
 def job(request: Request, token: Surveyor, job: int) -> dict[str, Any]:
     """``state`` is running, done or failed; ``share`` runs from 0 to 1."""
-    found = _surveys(request).jobs.get(job)
+    found = surveys_of(request).jobs.get(job)
     if found is None or token.site not in {"", found.site}:
         raise Problem(404, "no such job", "start one")
     return found._asdict()
@@ -244,7 +244,7 @@ async def take(request: Request, token: str, way: str) -> Response:
         messages = await run_in_threadpool(ADAPTERS[_WAYS[way]].read, body, profile, arrived)
     except SayToUserError as error:
         return PlainTextResponse(f"{error.what}: {error.remedy}", _SAY_TO_USER)
-    store = _surveys(request).store(name)
+    store = surveys_of(request).store(name)
     n = 0
     for message in messages:
         push = _push(message, arrived)
@@ -275,8 +275,3 @@ def _scan(scan: WifiScan) -> Scan:
     return Scan(
         scan.t, [Ap(bssid_text(b), r, f, None if math.isnan(seen) else seen) for b, r, f, seen in readings]
     )
-
-
-def _surveys(request: Request) -> Surveys:
-    surveys: Surveys = request.app.state.surveys
-    return surveys

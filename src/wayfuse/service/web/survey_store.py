@@ -6,7 +6,7 @@
     FOLDER/walks/ID.json          a walk: which phone, and where it was when (server's clock)
     FOLDER/recordings/ID-NAME     uploaded files, as they came
 
-Nothing here is deleted by itself: a survey is made to last. The page and the interface delete single parts.
+What is older than it may be goes by `trim`, what a phone collected by `forget`, single parts by `remove`.
 """
 
 from __future__ import annotations
@@ -68,6 +68,9 @@ class SurveyStore:
         self._folder = folder
         self._lock = threading.Lock()
         self._phones: dict[str, Phone] = {}
+        self._written: set[str] = set()  # phones whose file ends with a whole line
+        for path in self._folder.glob("scans/*.new"):
+            path.unlink()  # of a trim that a crash cut off
         for path in self._in("scans"):
             pushes = list(self.pushes(path.stem))
             self._phones[path.stem] = Phone(
@@ -83,7 +86,10 @@ class SurveyStore:
             known = self._phones.get(device, Phone(device, 0.0, 0))
             path = self._path("scans", f"{_checked(device)}.jsonl")
             with path.open("ab") as out:
-                out.write(msgspec.json.encode(push) + b"\n")
+                # the line before may have been cut off by a crash
+                begin = b"" if device in self._written or not path.stat().st_size else b"\n"
+                out.write(begin + msgspec.json.encode(push) + b"\n")
+            self._written.add(device)
             self._phones[device] = Phone(device, push.arrived, known.scans + len(push.scans))
 
     def pushes(self, device: str) -> Iterator[Push]:
@@ -116,7 +122,7 @@ class SurveyStore:
 
     def walks(self) -> dict[str, TappedWalk]:
         """All walks by identifier."""
-        return {p.stem: msgspec.json.decode(p.read_bytes(), type=TappedWalk) for p in self._in("walks")}
+        return {p.stem: _walk(p) for p in self._in("walks")}
 
     # --- recordings
 
@@ -148,6 +154,52 @@ class SurveyStore:
                 path.unlink()
         return bool(found)
 
+    # --- what may not be kept
+
+    def forget(self, device: str) -> int:
+        """Delete the scans a phone pushed and the walks tapped for it; how many files that were.
+
+        Uploaded recordings do not say whose they are; they stay.
+        """
+        with self._lock:
+            found = self.files_of(device)
+            for path in found:
+                path.unlink()
+            self._phones.pop(device, None)
+        return len(found)
+
+    def files_of(self, device: str) -> list[Path]:
+        """The files that `forget` would delete."""
+        scans = self._folder / "scans" / f"{_checked(device)}.jsonl"
+        walks = [path for path in self._in("walks") if _walk(path).device == device]
+        return [path for path in (scans, *walks) if path.is_file()]
+
+    def trim(self, before: float) -> None:
+        """Delete scans that arrived, walks that ended, and recordings that were uploaded before a time (Unix s)."""
+        with self._lock:
+            for path in self._in("scans"):
+                self._trim_scans(path, before)
+            for path in self._in("walks"):
+                if _walk(path).waypoints[-1].t < before:
+                    path.unlink()
+            for path in self._in("recordings"):
+                if path.stat().st_mtime < before:
+                    path.unlink()
+
+    def _trim_scans(self, path: Path, before: float) -> None:
+        pushes = list(self.pushes(path.stem))
+        kept = [push for push in pushes if push.arrived >= before]
+        if len(kept) == len(pushes):
+            return
+        if not kept:
+            path.unlink()
+            self._phones.pop(path.stem, None)
+            return
+        new = path.with_suffix(".new")
+        new.write_bytes(b"".join(msgspec.json.encode(push) + b"\n" for push in kept))
+        new.replace(path)
+        self._phones[path.stem] = Phone(path.stem, kept[-1].arrived, sum(len(p.scans) for p in kept))
+
     # --- files
 
     def _path(self, kind: str, name: str) -> Path:
@@ -163,6 +215,10 @@ class SurveyStore:
             raise UsageError(
                 "the survey of this site is full", remedy="delete recordings that are no longer needed"
             )
+
+
+def _walk(path: Path) -> TappedWalk:
+    return msgspec.json.decode(path.read_bytes(), type=TappedWalk)
 
 
 def _checked(device: str) -> str:

@@ -7,6 +7,8 @@ from collections import OrderedDict
 from hashlib import sha256
 from pathlib import Path
 
+from fastapi import Request
+
 from wayfuse.core.errors import RadioMapError
 from wayfuse.radio.survey import Survey
 from wayfuse.service.server import Server
@@ -14,7 +16,7 @@ from wayfuse.service.web.jobs import Jobs
 from wayfuse.service.web.survey_store import SurveyStore
 from wayfuse.service.world import survey_of
 
-__all__ = ["Surveys"]
+__all__ = ["Surveys", "surveys_of"]
 
 _KEPT = 2  # radio maps are large, and the page asks for many pictures of one
 
@@ -26,7 +28,7 @@ class Surveys:
         self.jobs = Jobs(server.clock)
         self._server = server
         self._folder = Path(server.settings.data) / "survey"
-        self._stores: dict[str, SurveyStore] = {}
+        self._stores: dict[str, SurveyStore] = {}  # by name of the folder
         self._known: OrderedDict[tuple[str, int], Survey] = OrderedDict()
         self._lock = threading.Lock()
 
@@ -53,6 +55,30 @@ class Surveys:
     def store(self, site: str) -> SurveyStore:
         """What is collected at a site."""
         with self._lock:
-            if site not in self._stores:
-                self._stores[site] = SurveyStore(self._folder / sha256(site.encode()).hexdigest()[:16])
-            return self._stores[site]
+            return self._in(sha256(site.encode()).hexdigest()[:16])
+
+    def everywhere(self) -> list[SurveyStore]:
+        """What is collected at all sites, also at those that are no longer served."""
+        with self._lock:
+            return [self._in(path.name) for path in sorted(self._folder.glob("*")) if path.is_dir()]
+
+    def clean(self) -> None:
+        """Delete what is older than it may be."""
+        before = self._server.clock() - 86_400.0 * self._server.settings.retain_survey_d
+        for store in self.everywhere():
+            store.trim(before)
+
+    def forget(self, device: str) -> int:
+        """Delete what a phone collected, by its pseudonym; how many files that were."""
+        return sum(store.forget(device) for store in self.everywhere())
+
+    def _in(self, folder: str) -> SurveyStore:
+        if folder not in self._stores:
+            self._stores[folder] = SurveyStore(self._folder / folder)
+        return self._stores[folder]
+
+
+def surveys_of(request: Request) -> Surveys:
+    """The surveys of an application."""
+    surveys: Surveys = request.app.state.surveys
+    return surveys
