@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from wayfuse.models.survey_walk import place_of
 from wayfuse.presets.catalogue import METHODS
 from wayfuse.radio.ap_places import ApPlaces, write_ap_places
 
@@ -171,6 +172,20 @@ def test_dead_reckoning_starts_where_it_is_told(world: Any, track: Run, tmp_path
     assert "not used by this method" in said.out
     stated = world.walks[0].waypoints[0]
     assert float(rows(tmp_path / "EST.csv")[0]["x"]) == pytest.approx(stated.x, abs=2e-3)
+
+
+@pytest.mark.parametrize("start", ["told", "waypoint"])
+def test_published_systems_begin_where_they_are_told(
+    world: Any, track: Run, tmp_path: Path, start: str
+) -> None:
+    path, stated = walk_paths(world)[0], world.walks[0].waypoints[0]
+    x, y, floor = place_of(world.site, stated)
+    where = "waypoint" if start == "waypoint" else f"{x:.3f},{y:.3f},{world.site.floor_names[floor]}"
+    assert track(path, "--method", "he2014", "--method", "karlsson2015", "--start", where).code == 0
+    first = {r["method"]: r for r in reversed(rows(tmp_path / "EST.csv"))}
+    for method in ("he2014", "karlsson2015"):
+        assert np.hypot(float(first[method]["x"]) - x, float(first[method]["y"]) - y) < 1.0
+        assert first[method]["state"] == "tracking"
 
 
 @pytest.mark.parametrize(

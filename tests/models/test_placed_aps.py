@@ -156,10 +156,12 @@ def test_an_unknown_start_is_anywhere_on_the_floor_that_is_heard_in_any_directio
 
 def test_a_told_start_is_where_it_is_told() -> None:
     known = KnownStart(x=3.0, y=4.0, floor=1, sigma=0.5, scale_sigma=0.0)
-    drawn = ToldStart(known, has_compass=False).draw(Noise.of(0, "c"), None, 4000, heading_known=True)
+    drawn = ToldStart(about=known, has_compass=False).draw(Noise.of(0, "c"), None, 4000, heading_known=True)
     assert float(drawn.x.mean()) == pytest.approx(3.0, abs=0.1)
     assert float(drawn.heading_bias.std()) > 1.5
     assert (
-        float(ToldStart(known).draw(Noise.of(0, "c"), None, 4000, heading_known=True).heading_bias.std())
+        float(
+            ToldStart(about=known).draw(Noise.of(0, "c"), None, 4000, heading_known=True).heading_bias.std()
+        )
         < 0.5
     )

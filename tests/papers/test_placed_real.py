@@ -16,10 +16,12 @@ from wayfuse.inertial.derivative_steps import count_steps
 from wayfuse.maps.importers.ipin2023 import import_site
 from wayfuse.models.survey_walk import place_of, survey_walk
 from wayfuse.papers import karlsson2015_real, liu2017_real
-from wayfuse.papers.ipin2023_walks import first_waypoint, fused_beside, measure, steps_alone
+from wayfuse.papers.ipin2023_walks import WalkMethod, fused_beside, measure, steps_alone
 from wayfuse.papers.oxford_counts import step_count_table
 from wayfuse.papers.sodindoorloc_buildings import read_buildings
 from wayfuse.presets import karlsson2015_tracker, liu2017_tracker
+from wayfuse.presets.methods import begun_at
+from wayfuse.tracking.dead_reckoning import Start
 
 
 def test_absent_data_are_said_to_be_absent(tmp_path: Path) -> None:
@@ -60,9 +62,9 @@ def museum(data_root: Path) -> Repetitions:
 
 @pytest.mark.real_data
 def test_walks_that_stay_on_a_floor_are_tracked_without_their_own_repetition(museum: Repetitions) -> None:
-    builds = {"steps": steps_alone, "fused": fused_beside}
-    pickle.dumps(builds)  # goes to other processes
-    found = measure(museum, builds, (0,), in_turn)
+    methods = {"steps": WalkMethod(steps_alone, from_waypoint=True), "fused": WalkMethod(fused_beside)}
+    pickle.dumps(methods)  # goes to other processes
+    found = measure(museum, methods, (0,), in_turn)
     assert list(found) == ["steps", "fused"]
     for pooled in found.values():
         points = pooled.joined("waypoints")
@@ -76,8 +78,8 @@ def test_walks_that_stay_on_a_floor_are_tracked_without_their_own_repetition(mus
 @pytest.mark.parametrize("build", [liu2017_tracker.build, karlsson2015_tracker.build])
 def test_one_real_walk_from_its_start(museum: Repetitions, build: Any) -> None:
     walk = next(r for r in museum.recordings if key_of(r.name) == (1, 1))
-    start = first_waypoint(museum.site, walk)
-    tracker = build(museum.site, museum.survey(1), start=start)
+    start = Start(*place_of(museum.site, walk.waypoints[0]))
+    tracker = begun_at(build(museum.site, museum.survey(1)), start)
     found = tracker.run(walk).estimates
     t = np.array([e.t for e in found])
     off = []

@@ -10,6 +10,7 @@ import pytest
 
 from wayfuse.core.errors import UsageError
 from wayfuse.presets import chu2009_tracker, he2014_tracker
+from wayfuse.presets.methods import begun_at
 from wayfuse.tracking.dead_reckoning import Start
 from wayfuse.tracking.estimate import State
 
@@ -48,12 +49,10 @@ def test_one_step_after_the_other_gives_the_bits_of_the_whole(world: Any, tracke
     assert said + tracker.flush(state, recording.span[1])[1] == tracker.run(recording, 0).estimates
 
 
-def test_a_start_that_is_told_is_where_the_track_begins(world: Any, name: str) -> None:
+def test_a_start_that_is_told_is_where_the_track_begins(world: Any, tracker: Any) -> None:
     recording = world.walks[1]
     x, y = world.truth[recording.name].at(np.array([recording.span[0]]))[0]
-    said = (
-        BUILDS[name](world.site, world.survey, start=Start(float(x), float(y), 0)).run(recording, 0).estimates
-    )
+    said = begun_at(tracker, Start(float(x), float(y), 0)).run(recording, 0).estimates
     assert np.hypot(said[0].x - x, said[0].y - y) < 1.0
     assert said[0].floor == 0
 

@@ -13,7 +13,8 @@ from wayfuse.models.constraint.barriers import Barriers
 from wayfuse.models.constraint.walkable_mask import WalkableMask
 from wayfuse.presets import baselines
 from wayfuse.presets.catalogue import METHODS, PAPERS
-from wayfuse.presets.fused import BAND_2_4, BAND_5, Config, build, check_floors, prior_estimate
+from wayfuse.presets.fused import BAND_2_4, BAND_5, Config, build, prior_estimate
+from wayfuse.presets.given import check_floors
 from wayfuse.presets.methods import CONFIGS, FIXES, build_method
 from wayfuse.radio.survey import Fingerprint
 from wayfuse.tracking.estimate import Estimate, State

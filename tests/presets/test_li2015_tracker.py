@@ -22,10 +22,11 @@ from wayfuse.models.motion.constant_velocity import ConstantVelocity, MovingClou
 from wayfuse.models.motion.course_and_speed import CourseAndSpeed, Held, StepsOrVelocity
 from wayfuse.models.motion.pdr import StepInput
 from wayfuse.models.observation.ranges import Exponents
-from wayfuse.models.range_start import RangeStart
+from wayfuse.models.range_start import RangeStart, RestingStart
 from wayfuse.papers.li2015_real import read_walks
 from wayfuse.presets.li2015 import Config
 from wayfuse.presets.li2015_tracker import build
+from wayfuse.presets.methods import begun_at
 from wayfuse.radio.ap_places import ApPlaces
 from wayfuse.radio.range_correction import RangeLine, fit_range_line
 from wayfuse.sensors.recording import Recording
@@ -120,8 +121,7 @@ def test_the_start_is_the_fix_of_the_anchors_of_one_floor() -> None:
     assert few.x.std() == pytest.approx(20.0, rel=0.06)  # somewhere about the one anchor
     for nothing in (None, (), (Range(0.0, 99, 5.0),)):
         assert start.draw(Noise.of(0, "c"), nothing, N, heading_known=True) is None
-    told = replace(start, told=(3.0, 4.0, 0, 0.5)).draw(Noise.of(0, "c"), None, N, heading_known=True)
-    assert told is not None
+    told = RestingStart(sigma=0.5).at(3.0, 4.0, 0).draw(Noise.of(0, "c"), None, N)
     assert [told.x.mean(), told.y.mean(), told.floor[0]] == pytest.approx([3.0, 4.0, 0.0], abs=0.05)
 
 
@@ -183,7 +183,7 @@ def test_replay_is_the_live_form_and_a_start_is_taken(world: Any, ranged: Any) -
     recording, places, truth = ranged
     x, y = truth.at(truth.t[:1])[0]
     start = Start(float(x), float(y), world.site.floor_index(truth.floor_name))
-    tracker = build(world.site, None, places=places, start=start, config=SPREAD, lag=2.0)
+    tracker = begun_at(build(world.site, None, places=places, config=SPREAD, lag=2.0), start)
     whole = tracker.run(recording, 3).estimates
     state, live = tracker.init(recording.name, 3), []
     for record in replace(recording, waypoints=()).records():

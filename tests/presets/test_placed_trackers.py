@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from wayfuse.core.errors import UsageError
-from wayfuse.papers.ipin2023_walks import first_waypoint
+from wayfuse.models.survey_walk import place_of
 from wayfuse.presets import karlsson2015, karlsson2015_tracker, liu2017, liu2017_tracker
+from wayfuse.presets.methods import begun_at
 from wayfuse.radio.ap_estimation import estimate_places
 from wayfuse.radio.ap_places import ApPlaces
 from wayfuse.tracking.dead_reckoning import Start
@@ -56,12 +57,12 @@ def test_places_alone_do_without_a_survey(world: Any, name: str) -> None:
 def test_a_told_start_is_where_the_track_begins(world: Any, name: str) -> None:
     build, config = BUILDS[name]
     walk = world.walks[0]
-    start = first_waypoint(world.site, walk)
-    told = build(world.site, world.survey, start=start, config=config)
-    first = told.run(walk).estimates[0]
+    start = Start(*place_of(world.site, walk.waypoints[0]))
+    tracker = build(world.site, world.survey, config=config)
+    first = begun_at(tracker, start).run(walk).estimates[0]
     assert np.hypot(first.x - start.x, first.y - start.y) < 6.0
     assert first.floor == start.floor
-    far = build(world.site, world.survey, start=Start(1.0, 1.0, 0), config=config).run(walk).estimates[0]
+    far = begun_at(tracker, Start(1.0, 1.0, 0)).run(walk).estimates[0]
     assert np.hypot(far.x - 1.0, far.y - 1.0) < np.hypot(first.x - 1.0, first.y - 1.0)
 
 

@@ -9,21 +9,26 @@ from typing import Any
 import numpy as np
 import pytest
 
-from wayfuse.core.errors import ConfigError
+from wayfuse.core.errors import ConfigError, UsageError
 from wayfuse.core.philox import Noise
 from wayfuse.core.types import Array
 from wayfuse.filters.cloud import Cloud
 from wayfuse.filters.particle_filter import ParticleFilter
 from wayfuse.filters.widening import WideningFilter, scaling
 from wayfuse.inertial.front_end import StepEvent
+from wayfuse.models.initial import KnownStart
 from wayfuse.models.motion.pdr import PdrMotion
 from wayfuse.models.motion.random_walk import RandomWalk
+from wayfuse.models.placed_start import ToldStart
+from wayfuse.presets.methods import begun_at
 from wayfuse.radio.survey import Fingerprint
 from wayfuse.sensors.quality import Verdict
 from wayfuse.sensors.recording import Recording, Series
 from wayfuse.sensors.records import Range
+from wayfuse.tracking.dead_reckoning import Start
 from wayfuse.tracking.engine import Known
 from wayfuse.tracking.estimate import Estimate, State
+from wayfuse.tracking.fix_engine import FixEngine
 from wayfuse.tracking.plain_engine import PlainEngine, Seen
 from wayfuse.tracking.tracker import Tracker
 
@@ -71,8 +76,8 @@ class Anywhere:
 
 def engine(**changes: Any) -> PlainEngine:
     parts: dict[str, Any] = {
-        "n_floors": 1, "prior": PRIOR, "first": Anywhere(), "motion": PdrMotion(), "quiet": RandomWalk(0.5),
-        "ranging": ToAnchors(), "n_particles": 2000,
+        "n_floors": 1, "prior": PRIOR, "first": Anywhere(), "told": ToldStart(about=KnownStart(sigma=0.5)),
+        "motion": PdrMotion(), "quiet": RandomWalk(0.5), "ranging": ToAnchors(), "n_particles": 2000,
     }  # fmt: skip
     return PlainEngine(**{**parts, **changes})
 
@@ -200,3 +205,15 @@ def test_bad_use_is_named() -> None:
         engine(n_particles=3)
     begun = engine(starts_unseen=True)
     assert begun.init("r", 0).filter is not None
+
+
+def test_a_place_that_is_told_is_where_tracks_begin_with_all_else_as_it_was() -> None:
+    made = engine()
+    told = begun_at(Tracker(engine=made), Start(12.0, 3.0, 0)).engine
+    first = told.estimate(told.init("r", 0), 0.0)[1]
+    assert np.hypot(first.x - 12.0, first.y - 3.0) < 0.2
+    assert told.ranging is made.ranging
+    assert made.init("r", 0).filter is None
+    scan_by_scan: Any = FixEngine(radio_map=None, prior=PRIOR)  # type: ignore[arg-type]
+    with pytest.raises(UsageError, match="finds its start itself"):
+        begun_at(Tracker(engine=scan_by_scan), Start(12.0, 3.0, 0))

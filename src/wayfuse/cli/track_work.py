@@ -26,7 +26,7 @@ __all__ = ["Result", "Worker"]
 def _check_made_for(made: WalkRadioMap, site: Site, path: Path) -> None:
     """Refuse the radio map of another site."""
     from wayfuse.core.errors import RadioMapError
-    from wayfuse.presets.fused import check_floors
+    from wayfuse.presets.given import check_floors
 
     check_floors(site, made.survey)
     if made.site != site.name:
@@ -50,7 +50,7 @@ class Result:
 
 
 class _Loaded:
-    """What a process loads once. trackers : by method, for those that do not begin at a start of the recording's."""
+    """What a process loads once. trackers : by method; of a method that needs a start only where one is told."""
 
     def __init__(self, site: Site, survey: Survey | None, places: ApPlaces | None) -> None:
         from wayfuse.models.observation.coverage import SurveyDistance
@@ -97,11 +97,10 @@ class Worker:
             start = _check_start(self.start, site) if self.start is not None or self._need("start") else None
             survey = None if self.paths[1] is None else _survey(site, self.paths[1])
             loaded = _Loaded(site, survey, _places(site, self.paths[2]))
-            own = self.start is not None and start is None  # every recording has a start of its own
             loaded.trackers = {
                 name: self._build(loaded, name, start)
                 for name in self.methods
-                if not (own and (METHODS[name].may_start or "start" in METHODS[name].needs))
+                if start is not None or "start" not in METHODS[name].needs
             }
             self.loaded = loaded
         return self.loaded
@@ -132,21 +131,16 @@ class Worker:
                 )
 
     def _build(self, loaded: _Loaded, name: str, start: Start | None) -> Any:
-        from wayfuse.presets.methods import build_from_start, build_method
+        from wayfuse.presets.methods import begun_at, build_from_start, build_method
 
         if "start" in METHODS[name].needs:
-            assert start is not None  # noqa: S101 (`prepare` asked for one)
+            assert start is not None  # noqa: S101 (`prepare` asked for one, or the recording has one)
             n_particles = 1000 if self.particles is None else self.particles
             return build_from_start(name, loaded.site, start, n_particles=n_particles, lag=self.lag)
-        return build_method(
-            name,
-            loaded.site,
-            loaded.survey,
-            places=loaded.places,
-            start=start,
-            n_particles=self.particles,
-            lag=self.lag,
+        tracker = build_method(
+            name, loaded.site, loaded.survey, places=loaded.places, n_particles=self.particles, lag=self.lag
         )
+        return begun_at(tracker, start) if start is not None and METHODS[name].may_start else tracker
 
     def __call__(self, path: Path) -> Result:
         """Read and track."""
@@ -171,7 +165,9 @@ class Worker:
         result = Result(ok=True)
         result.notes += [*recording.report.describe(), *_lacks(recording, self.methods)]
         for name in self.methods:
-            tracker = loaded.trackers.get(name) or self._from_its_start(loaded, name, recording, result)
+            tracker = loaded.trackers.get(name)
+            if self.start == "waypoint" and METHODS[name].takes_start:
+                tracker = self._from_its_start(loaded, name, recording, result)
             if tracker is None:
                 continue
             done = tracker.run(recording, self.seed)
@@ -187,9 +183,10 @@ class Worker:
         return result
 
     def _from_its_start(self, loaded: _Loaded, name: str, recording: Recording, result: Result) -> Any:
-        """A tracker from the recording's first waypoint; None, and a note, where a method needs one and has none."""
+        """The tracker from the recording's first waypoint; None, and a note, where a method needs one and has none."""
         from wayfuse.core.errors import MapError
         from wayfuse.models.survey_walk import place_of
+        from wayfuse.presets.methods import begun_at
         from wayfuse.tracking.dead_reckoning import Start
 
         try:
@@ -198,9 +195,9 @@ class Worker:
             if "start" in METHODS[name].needs:
                 why = "no waypoint" if isinstance(error, IndexError) else str(error)
                 result.notes.append(f"{recording.path}: {why}: {name} has no start, not tracked")
-                return None
-            start = None
-        return self._build(loaded, name, start)
+            return loaded.trackers.get(name)
+        made = loaded.trackers.get(name)
+        return self._build(loaded, name, start) if made is None else begun_at(made, start)
 
 
 def _survey(site: Site, path: Path) -> Survey:
@@ -255,9 +252,10 @@ def _lacks(recording: Recording, methods: tuple[str, ...]) -> list[str]:
         "scans": bool(recording.wifi),
         "ranges": bool(recording.ranges),
         "pressure": len(recording.pressure) > 0,
+        "steps": bool(recording.steps) or len(recording.acceleration) > 0,
     }
     out = []
-    if not recording.wifi and any("scans" in METHODS[name].hears for name in methods):
+    if not has["scans"] and any("scans" in METHODS[name].hears for name in methods):
         out.append(f"{where}: no Wi-Fi scan: the position stays unknown (state initialising)")
     for name in methods:
         if "ranges" in METHODS[name].hears and not has["ranges"]:
@@ -265,6 +263,6 @@ def _lacks(recording: Recording, methods: tuple[str, ...]) -> list[str]:
         unused = [kind for key, kind in _KINDS.items() if has[key] and key not in METHODS[name].hears]
         if unused and name in PAPERS:
             out.append(f"{where}: {name} does not use: {', '.join(unused)}")
-    if not len(recording.acceleration):
+    if not has["steps"]:
         out.append(f"{where}: no accelerometer: no steps, the position diffuses between scans")
     return out

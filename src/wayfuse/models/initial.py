@@ -71,9 +71,9 @@ class KnownStart:
     x, y : m, frame of the floor. floor : index. sigma : m. heading_known : whether the phone has an absolute heading.
     """
 
-    x: float
-    y: float
-    floor: int
+    x: float = 0.0
+    y: float = 0.0
+    floor: int = 0
     sigma: float = 1.0
     bias_sigma: float = 0.25
     scale_sigma: float = 0.1

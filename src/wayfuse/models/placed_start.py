@@ -20,16 +20,26 @@ from wayfuse.radio.survey import Fingerprint
 __all__ = ["AnywhereOnFloor", "SequenceStart", "ToldStart"]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class ToldStart:
-    """A place that is told. has_compass : False = the heading is unknown whatever the phone says."""
+    """A place that is told.
 
-    start: KnownStart
+    Parameters
+    ----------
+    about : the place, and how far from it somebody may be. has_compass : False = the heading is unknown whatever the
+    phone says.
+    """
+
+    about: KnownStart
     has_compass: bool = True
+
+    def at(self, x: float, y: float, floor: int) -> ToldStart:
+        """The same about another place: x, y (m), floor index."""
+        return replace(self, about=replace(self.about, x=x, y=y, floor=floor))
 
     def draw(self, noise: Noise, seen: object, n: int, *, heading_known: bool) -> Cloud:  # noqa: ARG002
         """n particles about the place; what was seen does not matter."""
-        return replace(self.start, heading_known=heading_known and self.has_compass).draw(noise, n)
+        return replace(self.about, heading_known=heading_known and self.has_compass).draw(noise, n)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -7,7 +7,7 @@ heard count. Particles are at rest (`models.motion.course_and_speed`), but for a
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -20,9 +20,41 @@ from wayfuse.radio.range_correction import AS_MEASURED, RangeLine
 from wayfuse.radio.survey import Fingerprint
 from wayfuse.sensors.records import Range
 
-__all__ = ["RangeStart"]
+__all__ = ["RangeStart", "RestingStart"]
 
 _FEW = 3  # anchors; with fewer there is no fix, and the centroid is as far off as the nearest range
+
+
+@dataclass(frozen=True, slots=True)
+class RestingStart:
+    """About a place that is told, hardly moving.
+
+    Parameters
+    ----------
+    x, y : m, frame of the floor. floor : index. sigma : m, speed_sigma : m/s, per axis.
+    """
+
+    x: float = 0.0
+    y: float = 0.0
+    floor: int = 0
+    sigma: float = 3.0
+    speed_sigma: float = 0.5
+
+    def at(self, x: float, y: float, floor: int) -> RestingStart:
+        """The same about another place."""
+        return replace(self, x=x, y=y, floor=floor)
+
+    def draw(self, noise: Noise, seen: object, n: int, *, heading_known: bool = True) -> Cloud:  # noqa: ARG002
+        """n particles about the place, with the velocities of `models.motion.course_and_speed`."""
+        z = noise.normals(n)
+        vx, vy = self.speed_sigma * z[2].astype(np.float64), self.speed_sigma * z[3].astype(np.float64)
+        return Cloud.on_floors(
+            (self.x + self.sigma * z[0]).astype(np.float32),
+            (self.y + self.sigma * z[1]).astype(np.float32),
+            np.arctan2(vy, vx).astype(np.float32),
+            np.hypot(vx, vy).astype(np.float32),
+            np.full(n, self.floor, np.int32),
+        )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -32,15 +64,13 @@ class RangeStart:
     Parameters
     ----------
     places : of the anchors. line : from ranges to distances. sigma : m, per axis, about the fix;
-    more where its ranges misfit it by more.
-    speed_sigma : m/s, per axis. told : x, y (m), floor and sigma (m) of a start that is known, None = from ranges.
+    more where its ranges misfit it by more. speed_sigma : m/s, per axis.
     """
 
     places: ApPlaces
     line: RangeLine = AS_MEASURED
     sigma: float = 3.0
     speed_sigma: float = 0.5
-    told: tuple[float, float, int, float] | None = None
 
     def __post_init__(self) -> None:
         if not (self.sigma > 0.0 and self.speed_sigma >= 0.0):
@@ -49,20 +79,9 @@ class RangeStart:
             )
 
     def draw(self, noise: Noise, seen: object, n: int, *, heading_known: bool) -> Cloud | None:  # noqa: ARG002
-        """n particles; None where no range to a known anchor was seen and nothing told."""
-        where = self.told or self._fix(seen)
-        if where is None:
-            return None
-        x, y, floor, sigma = where
-        z = noise.normals(n)
-        vx, vy = self.speed_sigma * z[2].astype(np.float64), self.speed_sigma * z[3].astype(np.float64)
-        return Cloud.on_floors(
-            (x + sigma * z[0]).astype(np.float32),
-            (y + sigma * z[1]).astype(np.float32),
-            np.arctan2(vy, vx).astype(np.float32),
-            np.hypot(vx, vy).astype(np.float32),
-            np.full(n, floor, np.int32),
-        )
+        """n particles; None where no range to a known anchor was seen."""
+        fix = self._fix(seen)
+        return None if fix is None else RestingStart(*fix, speed_sigma=self.speed_sigma).draw(noise, seen, n)
 
     def _fix(self, seen: object) -> tuple[float, float, int, float] | None:
         if seen is None or isinstance(seen, Fingerprint) or not isinstance(seen, tuple | list):

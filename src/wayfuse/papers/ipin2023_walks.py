@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -22,6 +22,7 @@ from wayfuse.maps.site import Site
 from wayfuse.models.survey_walk import place_of
 from wayfuse.papers.reproduction import Interval, Table
 from wayfuse.presets import baselines, fused
+from wayfuse.presets.methods import begun_at
 from wayfuse.radio.ap_estimation import estimate_places
 from wayfuse.radio.ap_places import ApPlaces
 from wayfuse.radio.survey import Survey
@@ -29,33 +30,35 @@ from wayfuse.sensors.recording import Recording
 from wayfuse.tracking.dead_reckoning import Start
 from wayfuse.tracking.tracker import Tracker
 
-__all__ = ["SEEDS", "Build", "first_waypoint", "fused_beside", "measure", "steps_alone", "walk_table"]
+__all__ = ["SEEDS", "Build", "WalkMethod", "fused_beside", "measure", "steps_alone", "walk_table"]
 
 SEEDS = (0,)  # intervals are over walks
-Build: TypeAlias = Callable[[Site, Survey, ApPlaces, Recording], Tracker[Any]]
+Build: TypeAlias = Callable[[Site, Survey, ApPlaces], Tracker[Any]]
 
 
-def first_waypoint(site: Site, recording: Recording) -> Start:
-    """Where a walk begins, by its truth."""
-    return Start(*place_of(site, recording.waypoints[0]))
+class WalkMethod(NamedTuple):
+    """A row of the table. build : its tracker. from_waypoint : it is told where a walk begins."""
+
+    build: Build
+    from_waypoint: bool = False
 
 
-def steps_alone(site: Site, survey: Survey, places: ApPlaces, recording: Recording) -> Tracker[Any]:  # noqa: ARG001
-    """Dead reckoning from the first waypoint."""
-    return baselines.dead_reckoning(site, first_waypoint(site, recording))
+def steps_alone(site: Site, survey: Survey, places: ApPlaces) -> Tracker[Any]:  # noqa: ARG001
+    """Dead reckoning, from a start yet to be told."""
+    return baselines.dead_reckoning(site, Start(0.0, 0.0, 0))
 
 
-def fused_beside(site: Site, survey: Survey, places: ApPlaces, recording: Recording) -> Tracker[Any]:  # noqa: ARG001
+def fused_beside(site: Site, survey: Survey, places: ApPlaces) -> Tracker[Any]:  # noqa: ARG001
     """`fused`, which goes by fingerprints and the floor plan."""
     return fused.build(site, survey)
 
 
 def measure(
-    repetitions: Repetitions, builds: Mapping[str, Build], seeds: Sequence[int], mapper: Mapper
+    repetitions: Repetitions, rows: Mapping[str, WalkMethod], seeds: Sequence[int], mapper: Mapper
 ) -> dict[str, Pooled]:
     """Every method on every walk that stays on a floor, pooled over repetitions; a run is (method, seed)."""
     walks = [r for r in repetitions.recordings if not key_of(r.name).changes_floors]
-    worker = _Worker(repetitions, builds, tuple(seeds))
+    worker = _Worker(repetitions, rows, tuple(seeds))
     by_number: dict[int, list[Recording]] = {}
     for walk in walks:
         by_number.setdefault(key_of(walk.name).repetition, []).append(walk)
@@ -73,19 +76,24 @@ def measure(
 class _Worker:
     """Tracks one recording by every method and seed; travels to the worker processes."""
 
-    def __init__(self, repetitions: Repetitions, builds: Mapping[str, Build], seeds: tuple[int, ...]) -> None:
-        self.repetitions, self.builds, self.seeds = repetitions, builds, seeds
+    def __init__(
+        self, repetitions: Repetitions, rows: Mapping[str, WalkMethod], seeds: tuple[int, ...]
+    ) -> None:
+        self.repetitions, self.rows, self.seeds = repetitions, rows, seeds
         self.recordings = {recording.name: recording for recording in repetitions.recordings}
-        self.surveyed: dict[int, tuple[Survey, ApPlaces]] = {}
+        self.trackers: dict[int, dict[str, Tracker[Any]]] = {}  # by repetition and row
 
     def __call__(self, name: str) -> list[WalkEstimates]:
         site, recording, number = self.repetitions.site, self.recordings[name], key_of(name).repetition
-        if number not in self.surveyed:
+        if number not in self.trackers:
             survey = self.repetitions.survey(number)
-            self.surveyed = {number: (survey, estimate_places(survey))}  # walks of a repetition come in a row
+            places = estimate_places(survey)
+            made = {method: row.build(site, survey, places) for method, row in self.rows.items()}
+            self.trackers = {number: made}  # walks of a repetition come one after another
         out = []
-        for method, build in self.builds.items():
-            tracker = build(site, *self.surveyed[number], recording)
+        start = Start(*place_of(site, recording.waypoints[0]))
+        for method, built in self.trackers[number].items():
+            tracker = begun_at(built, start) if self.rows[method].from_waypoint else built
             for seed in self.seeds:
                 said = tracker.run(recording, seed).estimates
                 out.append(from_track(name, f"{method}#{seed}", said, site.floor_names))
@@ -95,7 +103,7 @@ class _Worker:
 def walk_table(
     title: str,
     folder: Path,
-    builds: Mapping[str, Build],
+    methods: Mapping[str, WalkMethod],
     mapper: Mapper,
     note: str,
     seeds: Sequence[int] = SEEDS,
@@ -105,7 +113,7 @@ def walk_table(
         why = "`wayfuse datasets fetch ipin2023-track3` gets the data set"
         return Table(title, ("not measured",), ((why,),))
     rows: list[tuple[str | float | Interval, ...]] = []
-    for name, pooled in measure(gather(folder, mapper), builds, seeds, mapper).items():
+    for name, pooled in measure(gather(folder, mapper), methods, seeds, mapper).items():
         points = pooled.joined("waypoints")
         found = error_intervals(points, Bootstrap())
         cells = [Interval(i.value, i.low, i.high) for i in (found["mean"], found["p50"], found["p90"])]

@@ -17,7 +17,7 @@ from wayfuse.core.types import Array, BoolArray
 from wayfuse.evaluation.results_folds import Mapper
 from wayfuse.inertial.derivative_steps import count_steps
 from wayfuse.maps.site import Site
-from wayfuse.papers.ipin2023_walks import Build, first_waypoint, fused_beside, walk_table
+from wayfuse.papers.ipin2023_walks import WalkMethod, fused_beside, walk_table
 from wayfuse.papers.oxford_counts import step_count_table
 from wayfuse.papers.reproduction import Interval, Table, mean_interval
 from wayfuse.papers.sodindoorloc_buildings import Building, absent, read_buildings
@@ -28,7 +28,7 @@ from wayfuse.radio.ap_places import ApPlaces
 from wayfuse.radio.band_correlation import SplitErrors, correlate, split_errors
 from wayfuse.radio.path_loss import PathLoss, distances, fit_path_loss, log_likelihood
 from wayfuse.radio.survey import Survey
-from wayfuse.sensors.recording import Recording, Series
+from wayfuse.sensors.recording import Series
 from wayfuse.tracking.tracker import Tracker
 
 __all__ = ["band_errors", "fix_errors", "real_tables", "walks_table"]
@@ -135,29 +135,25 @@ def _fixes(buildings: tuple[Building, ...]) -> Table:
 # --- walks --------------------------------------------------------------------------------------------------
 
 
-def _both(site: Site, survey: Survey, places: ApPlaces, recording: Recording) -> Tracker[Any]:  # noqa: ARG001
+def _both(site: Site, survey: Survey, places: ApPlaces) -> Tracker[Any]:
     return karlsson2015_tracker.build(site, survey, places=places)
 
 
-def _as_printed(site: Site, survey: Survey, places: ApPlaces, recording: Recording) -> Tracker[Any]:  # noqa: ARG001
+def _as_printed(site: Site, survey: Survey, places: ApPlaces) -> Tracker[Any]:
     config = replace(Config(), offset_sigma=0.0)
     return karlsson2015_tracker.build(site, survey, places=places, config=config)
 
 
-def _from_start(site: Site, survey: Survey, places: ApPlaces, recording: Recording) -> Tracker[Any]:
-    return karlsson2015_tracker.build(site, survey, places=places, start=first_waypoint(site, recording))
-
-
-def _wifi(site: Site, survey: Survey, places: ApPlaces, recording: Recording) -> Tracker[Any]:  # noqa: ARG001
+def _wifi(site: Site, survey: Survey, places: ApPlaces) -> Tracker[Any]:
     return karlsson2015_tracker.build(site, survey, places=places, use_steps=False)
 
 
-def _lower_band(site: Site, survey: Survey, places: ApPlaces, recording: Recording) -> Tracker[Any]:
-    return _both(site, survey, places.select(~_upper(survey, places)), recording)
+def _lower_band(site: Site, survey: Survey, places: ApPlaces) -> Tracker[Any]:
+    return _both(site, survey, places.select(~_upper(survey, places)))
 
 
-def _upper_band(site: Site, survey: Survey, places: ApPlaces, recording: Recording) -> Tracker[Any]:
-    return _both(site, survey, places.select(_upper(survey, places)), recording)
+def _upper_band(site: Site, survey: Survey, places: ApPlaces) -> Tracker[Any]:
+    return _both(site, survey, places.select(_upper(survey, places)))
 
 
 def _upper(survey: Survey, places: ApPlaces) -> BoolArray:
@@ -167,17 +163,17 @@ def _upper(survey: Survey, places: ApPlaces) -> BoolArray:
 
 def walks_table(folder: Path, mapper: Mapper) -> Table:
     """The filter on walks of a museum whose access points have estimated places, beside `fused`."""
-    builds: dict[str, Build] = {
-        "Wi-Fi + steps, start unknown": _both,
-        "Wi-Fi + steps, from the true place": _from_start,
-        "Wi-Fi + steps, levels of the phone known (as printed)": _as_printed,
-        "Wi-Fi + steps, 2.4 GHz alone": _lower_band,
-        "Wi-Fi + steps, 5 GHz alone": _upper_band,
-        "Wi-Fi alone": _wifi,
-        "fused (fingerprints, steps, plan)": fused_beside,
+    methods = {
+        "Wi-Fi + steps, start unknown": WalkMethod(_both),
+        "Wi-Fi + steps, from the true place": WalkMethod(_both, from_waypoint=True),
+        "Wi-Fi + steps, levels of the phone known (as printed)": WalkMethod(_as_printed),
+        "Wi-Fi + steps, 2.4 GHz alone": WalkMethod(_lower_band),
+        "Wi-Fi + steps, 5 GHz alone": WalkMethod(_upper_band),
+        "Wi-Fi alone": WalkMethod(_wifi),
+        "fused (fingerprints, steps, plan)": WalkMethod(fused_beside),
     }
     return walk_table(
-        "Real data: walks on one floor of ipin2023-track3 (m)", folder, builds, mapper,
+        "Real data: walks on one floor of ipin2023-track3 (m)", folder, methods, mapper,
         "Trials 01-05 and 21-27, error at the waypoints. PLACES AND POWERS OF ACCESS POINTS ARE ESTIMATED from the "
         "other repetitions, alpha and sigma fitted to them. The heading at the start is unknown throughout. "
         "Intervals over walks.",

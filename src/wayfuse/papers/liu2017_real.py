@@ -18,7 +18,7 @@ from wayfuse.core.types import Array
 from wayfuse.evaluation.results_folds import Mapper
 from wayfuse.inertial.autocorrelation_steps import count_steps
 from wayfuse.maps.site import Site
-from wayfuse.papers.ipin2023_walks import Build, first_waypoint, fused_beside, steps_alone, walk_table
+from wayfuse.papers.ipin2023_walks import WalkMethod, fused_beside, steps_alone, walk_table
 from wayfuse.papers.oxford_counts import step_count_table
 from wayfuse.papers.reproduction import Interval, Table, mean_interval
 from wayfuse.papers.sodindoorloc_buildings import Building, Samples, absent, read_buildings
@@ -28,7 +28,7 @@ from wayfuse.radio.ap_estimation import estimate_places
 from wayfuse.radio.ap_places import ApPlaces
 from wayfuse.radio.ap_sequence import Neighbours, from_positions
 from wayfuse.radio.survey import Survey
-from wayfuse.sensors.recording import Recording, Series
+from wayfuse.sensors.recording import Series
 from wayfuse.tracking.tracker import Tracker
 
 __all__ = ["estimated_places_errors", "fix_errors", "real_tables", "walks_table"]
@@ -176,34 +176,30 @@ def _estimates(buildings: tuple[Building, ...]) -> Table:
 # --- walks --------------------------------------------------------------------------------------------------
 
 
-def _liu(site: Site, survey: Survey, places: ApPlaces, recording: Recording) -> Tracker[Any]:  # noqa: ARG001
+def _liu(site: Site, survey: Survey, places: ApPlaces) -> Tracker[Any]:
     return liu2017_tracker.build(site, survey, places=places)
 
 
-def _as_printed(site: Site, survey: Survey, places: ApPlaces, recording: Recording) -> Tracker[Any]:  # noqa: ARG001
+def _as_printed(site: Site, survey: Survey, places: ApPlaces) -> Tracker[Any]:
     return liu2017_tracker.build(site, survey, places=places, config=replace(_CONFIG, levelled=False))
 
 
-def _from_start(site: Site, survey: Survey, places: ApPlaces, recording: Recording) -> Tracker[Any]:
-    return liu2017_tracker.build(site, survey, places=places, start=first_waypoint(site, recording))
-
-
-def _wifi(site: Site, survey: Survey, places: ApPlaces, recording: Recording) -> Tracker[Any]:  # noqa: ARG001
+def _wifi(site: Site, survey: Survey, places: ApPlaces) -> Tracker[Any]:
     return liu2017_tracker.build(site, survey, places=places, use_steps=False)
 
 
 def walks_table(folder: Path, mapper: Mapper) -> Table:
     """The filter on the walks, against its parts alone and beside `fused`."""
-    builds: dict[str, Build] = {
-        "sequences + steps": _liu,
-        "sequences + steps, from the true start": _from_start,
-        "sequences + steps, equal powers (as printed)": _as_printed,
-        "sequences alone": _wifi,
-        "steps alone, from the true start": steps_alone,
-        "fused (fingerprints, steps, plan)": fused_beside,
+    methods = {
+        "sequences + steps": WalkMethod(_liu),
+        "sequences + steps, from the true start": WalkMethod(_liu, from_waypoint=True),
+        "sequences + steps, equal powers (as printed)": WalkMethod(_as_printed),
+        "sequences alone": WalkMethod(_wifi),
+        "steps alone, from the true start": WalkMethod(steps_alone, from_waypoint=True),
+        "fused (fingerprints, steps, plan)": WalkMethod(fused_beside),
     }
     return walk_table(
-        "Real data: walks on one floor of ipin2023-track3 (m)", folder, builds, mapper,
+        "Real data: walks on one floor of ipin2023-track3 (m)", folder, methods, mapper,
         "Trials 01-05 and 21-27, error at the waypoints. PLACES OF ACCESS POINTS ARE ESTIMATED from the other "
         "repetitions, and so are their powers but in the row that says otherwise. Intervals over walks.",
     )  # fmt: skip

@@ -9,7 +9,8 @@ from those of ``fused``. Dead reckoning: steps from a known start.
 from __future__ import annotations
 
 from wayfuse.maps.site import Site
-from wayfuse.presets.fused import Config, build, check_floors, prior_estimate
+from wayfuse.presets.fused import Config, build, prior_estimate
+from wayfuse.presets.given import check_floors
 from wayfuse.radio.device_offset import DeviceOffset
 from wayfuse.radio.sparse_knn import SparseKnn
 from wayfuse.radio.survey import Survey

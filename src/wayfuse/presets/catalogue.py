@@ -31,6 +31,11 @@ class Method(NamedTuple):
     hears: tuple[str, ...] = ("scans",)
     may_start: bool = False
 
+    @property
+    def takes_start(self) -> bool:
+        """Whether a start that is told makes a difference."""
+        return self.may_start or "start" in self.needs
+
 
 METHODS: Mapping[str, Method] = {
     "fused": Method(
@@ -61,10 +66,12 @@ METHODS: Mapping[str, Method] = {
         may_start=True,
     ),
     "he2014": Method("He 2014: Gaussian-process radio map, adaptive motion model", may_start=True),
-    "karlsson2015": Method("Karlsson 2015: path loss of both bands, steps, heading unknown", ("places",)),
+    "karlsson2015": Method(
+        "Karlsson 2015: path loss of both bands, steps, heading unknown", ("places",), may_start=True
+    ),
     "li2015": Method(
         "Li 2015: ranges to anchors with exponents 1/d, velocity", ("anchors",), ("ranges",), may_start=True
     ),
-    "liu2017": Method("Liu 2017: order of access points, steps; no radio map", ("places",)),
+    "liu2017": Method("Liu 2017: order of access points, steps; no radio map", ("places",), may_start=True),
 }
 PAPERS = ("chu2009", "he2014", "karlsson2015", "li2015", "liu2017")

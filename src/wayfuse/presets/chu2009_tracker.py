@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from wayfuse.core.errors import UsageError
 from wayfuse.filters.particle_filter import ParticleFilter
 from wayfuse.filters.widening import WideningFilter, scaling
 from wayfuse.maps.site import Site
@@ -17,11 +16,11 @@ from wayfuse.models.motion.random_walk import RandomWalk
 from wayfuse.models.observation.mapped import MapLikelihood
 from wayfuse.models.placed_start import ToldStart
 from wayfuse.models.scan_start import LikelyPlaces
-from wayfuse.presets.fused import check_floors, prior_estimate
+from wayfuse.presets.fused import prior_estimate
+from wayfuse.presets.given import needed_survey
 from wayfuse.radio import interpolated_map
 from wayfuse.radio.ap_places import ApPlaces
 from wayfuse.radio.survey import Survey
-from wayfuse.tracking.dead_reckoning import Start
 from wayfuse.tracking.floor_change import FloorChange
 from wayfuse.tracking.plain_engine import PlainEngine, PlainState
 from wayfuse.tracking.tracker import Tracker
@@ -51,7 +50,6 @@ def build(
     survey: Survey | None,
     *,
     places: ApPlaces | None = None,  # noqa: ARG001
-    start: Start | None = None,
     config: Config | None = None,
     lag: float = 0.0,
 ) -> Tracker[PlainState]:
@@ -61,27 +59,18 @@ def build(
     ------
     UsageError : there is no survey. RadioMapError : the survey is of another site.
     """
-    if survey is None:
-        raise UsageError(
-            "chu2009 goes by fingerprints, there is no survey",
-            where="--radio-map",
-            remedy="give --radio-map FILE",
-        )
-    check_floors(site, survey)
+    survey = needed_survey("chu2009", site, survey)
     c = config or Config()
     radio_map = interpolated_map.fit(survey, sigma=c.kernel_sigma, missing=c.missing, cell=c.cell)
     walls = Barriers(tuple(floor.barrier_index for floor in site.floors), c.wall_penalty)
     motion, plain = StepDisc(r_max=c.r_max), ParticleFilter(ess_ratio=1.0)
     steps = WideningFilter(wider=scaling("r_max"), rounds=c.rounds, filter=plain)
-    told = start and KnownStart(x=start.x, y=start.y, floor=start.floor, sigma=0.5 * c.start_radius)
     floors = FloorChange(connectors=ConnectorMotion(site=site), steps=motion, filter=plain, constraint=walls)
     engine = PlainEngine(
         n_floors=len(site.floors),
         prior=prior_estimate(site),
-        first=ToldStart(told)
-        if told
-        else LikelyPlaces(radio_map=radio_map, radius=c.start_radius, most=c.aps, walls=walls),
-        starts_unseen=told is not None,
+        first=LikelyPlaces(radio_map=radio_map, radius=c.start_radius, most=c.aps, walls=walls),
+        told=ToldStart(about=KnownStart(sigma=0.5 * c.start_radius)),
         motion=motion,
         quiet=RandomWalk(c.diffusion),
         observation=MapLikelihood(radio_map=radio_map, most=c.aps),

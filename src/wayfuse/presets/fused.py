@@ -14,7 +14,7 @@ from typing import Literal
 
 import numpy as np
 
-from wayfuse.core.errors import ConfigError, RadioMapError, UsageError
+from wayfuse.core.errors import ConfigError, UsageError
 from wayfuse.filters.particle_filter import Constraint, ParticleFilter
 from wayfuse.filters.resampling import resampler
 from wayfuse.inertial.vertical_front_end import VerticalConfig, VerticalFrontEnd
@@ -30,6 +30,7 @@ from wayfuse.models.observation.anchored_ranges import AnchoredRanges
 from wayfuse.models.observation.coverage import SurveyDistance
 from wayfuse.models.observation.fingerprint import FingerprintLikelihood
 from wayfuse.models.observation.neighbouring import NeighbouringFloors
+from wayfuse.presets.given import check_floors
 from wayfuse.radio.ap_places import ApPlaces
 from wayfuse.radio.device_offset import DeviceOffset
 from wayfuse.radio.range_line import LineGrid
@@ -52,7 +53,6 @@ __all__ = [
     "build",
     "build_from_ranges",
     "build_from_start",
-    "check_floors",
     "prior_estimate",
 ]
 
@@ -285,15 +285,6 @@ def _constraint(site: Site, c: Config) -> Constraint | None:
     if c.map_constraint == "barriers":
         return Barriers(tuple(f.barrier_index for f in site.floors), c.penalty)
     return None
-
-
-def check_floors(site: Site, survey: Survey) -> None:
-    """Refuse a survey whose floors are not the site's."""
-    if survey.floors != site.floor_names:
-        raise RadioMapError(
-            f"the radio map has floors {', '.join(survey.floors)}, site {site.name} has {', '.join(site.floor_names)}",
-            remedy="build the radio map with this site",
-        )
 
 
 def prior_estimate(site: Site) -> Estimate:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from wayfuse.core.errors import UsageError
 from wayfuse.maps.site import Site
 from wayfuse.models.initial import KnownStart
 from wayfuse.models.motion.adaptive import AdaptiveMotion, StandingDisc
@@ -12,12 +11,12 @@ from wayfuse.models.motion.random_walk import RandomWalk
 from wayfuse.models.observation.mapped import MapLikelihood
 from wayfuse.models.placed_start import ToldStart
 from wayfuse.models.scan_start import NearestPlaces
-from wayfuse.presets.fused import check_floors, prior_estimate
+from wayfuse.presets.fused import prior_estimate
+from wayfuse.presets.given import needed_survey
 from wayfuse.radio import gaussian_process, knn
 from wayfuse.radio.ap_places import ApPlaces
 from wayfuse.radio.ap_selection import most_heard
 from wayfuse.radio.survey import Survey
-from wayfuse.tracking.dead_reckoning import Start
 from wayfuse.tracking.plain_engine import PlainEngine, PlainState
 from wayfuse.tracking.tracker import Tracker
 
@@ -47,7 +46,6 @@ def build(
     survey: Survey | None,
     *,
     places: ApPlaces | None = None,  # noqa: ARG001
-    start: Start | None = None,
     config: Config | None = None,
     lag: float = 0.0,
 ) -> Tracker[PlainState]:
@@ -59,22 +57,15 @@ def build(
     ------
     UsageError : there is no survey. RadioMapError : the survey is of another site.
     """
-    if survey is None:
-        raise UsageError(
-            "he2014 goes by fingerprints, there is no survey",
-            where="--radio-map",
-            remedy="give --radio-map FILE",
-        )
-    check_floors(site, survey)
+    survey = needed_survey("he2014", site, survey)
     c = config or Config()
     survey = most_heard(survey, c.n_aps)
     field = gaussian_process.fit(survey, step=c.step, max_points=c.max_points, max_nodes=c.max_nodes)
-    told = start and KnownStart(x=start.x, y=start.y, floor=start.floor, sigma=c.start_sigma)
     engine = PlainEngine(
         n_floors=len(site.floors),
         prior=prior_estimate(site),
-        first=ToldStart(told) if told else NearestPlaces(radio_map=knn.fit(survey, k=c.k)),
-        starts_unseen=told is not None,
+        first=NearestPlaces(radio_map=knn.fit(survey, k=c.k)),
+        told=ToldStart(about=KnownStart(sigma=c.start_sigma)),
         motion=AdaptiveMotion(radius=c.radius, length_sigma=c.length_sigma, heading_sigma=c.heading_sigma),
         standing=StandingDisc(radius=c.radius),
         quiet=RandomWalk(c.diffusion),

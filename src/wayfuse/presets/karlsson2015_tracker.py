@@ -8,13 +8,12 @@ from wayfuse.models.motion.random_walk import RandomWalk
 from wayfuse.models.motion.step_count import StepByStep, StepCountMotion
 from wayfuse.models.observation.placed_aps import PathLossLikelihood
 from wayfuse.models.placed_start import AnywhereOnFloor, ToldStart
-from wayfuse.presets.fused import check_floors, prior_estimate
+from wayfuse.presets.fused import prior_estimate
+from wayfuse.presets.given import check_floors, known_places
 from wayfuse.presets.karlsson2015 import Config
-from wayfuse.presets.liu2017_tracker import known_places
 from wayfuse.radio.ap_hearing import known_levels
 from wayfuse.radio.ap_places import ApPlaces
 from wayfuse.radio.survey import Survey
-from wayfuse.tracking.dead_reckoning import Start
 from wayfuse.tracking.plain_engine import PlainEngine, PlainState
 from wayfuse.tracking.tracker import Tracker
 
@@ -26,7 +25,6 @@ def build(
     survey: Survey | None,
     *,
     places: ApPlaces | None = None,
-    start: Start | None = None,
     config: Config | None = None,
     lag: float = 0.0,
     use_steps: bool = True,
@@ -46,15 +44,12 @@ def build(
         check_floors(site, survey)
     places = known_places(site, survey, places)
     levels = known_levels(survey, places, c.bands)
-    told = start and KnownStart(x=start.x, y=start.y, floor=start.floor, sigma=c.start_sigma, scale_sigma=0.0)
     walkable = tuple(floor.walkable for floor in site.floors)
     engine = PlainEngine(
         n_floors=len(site.floors),
         prior=prior_estimate(site),
-        first=ToldStart(told, has_compass=False)
-        if told
-        else AnywhereOnFloor(places=places, walkable=walkable),
-        starts_unseen=told is not None,
+        first=AnywhereOnFloor(places=places, walkable=walkable),
+        told=ToldStart(about=KnownStart(sigma=c.start_sigma, scale_sigma=0.0), has_compass=False),
         motion=StepByStep(
             StepCountMotion(
                 step_length=c.step_length, length_sigma=c.length_sigma, heading_sigma=c.heading_sigma

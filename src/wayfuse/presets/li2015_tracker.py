@@ -12,12 +12,11 @@ from wayfuse.maps.site import Site
 from wayfuse.models.motion.course_and_speed import CourseAndSpeed, Held, StepsOrVelocity
 from wayfuse.models.observation.anchored_ranges import AnchoredRanges
 from wayfuse.models.observation.corrected_ranges import CorrectedRanges
-from wayfuse.models.range_start import RangeStart
+from wayfuse.models.range_start import RangeStart, RestingStart
 from wayfuse.presets.fused import prior_estimate
 from wayfuse.presets.li2015 import Config
 from wayfuse.radio.ap_places import ApPlaces
 from wayfuse.radio.survey import Survey
-from wayfuse.tracking.dead_reckoning import Start
 from wayfuse.tracking.plain_engine import PlainEngine, PlainState
 from wayfuse.tracking.tracker import Tracker
 
@@ -29,7 +28,6 @@ def build(
     survey: Survey | None,  # noqa: ARG001
     *,
     places: ApPlaces | None = None,
-    start: Start | None = None,
     config: Config | None = None,
     lag: float = 0.0,
 ) -> Tracker[PlainState]:
@@ -58,9 +56,8 @@ def build(
             line=c.range_line,
             sigma=c.centroid_sigma,
             speed_sigma=c.start_velocity_sigma,
-            told=(start.x, start.y, start.floor, c.start_sigma) if start else None,
         ),
-        starts_unseen=start is not None,
+        told=RestingStart(sigma=c.start_sigma, speed_sigma=c.start_velocity_sigma),
         motion=StepsOrVelocity(c.step_sigma),
         standing=CourseAndSpeed(acceleration_sigma=c.acceleration_sigma),  # Eq. 4
         quiet=Held(),

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 
-from wayfuse.core.errors import UsageError
 from wayfuse.maps.site import Site
 from wayfuse.models.initial import KnownStart
 from wayfuse.models.motion.proportional_noise import ProportionalNoise
@@ -12,16 +11,15 @@ from wayfuse.models.motion.random_walk import RandomWalk
 from wayfuse.models.observation.placed_aps import SequenceLikelihood
 from wayfuse.models.placed_start import SequenceStart, ToldStart
 from wayfuse.presets.fused import prior_estimate
+from wayfuse.presets.given import known_places
 from wayfuse.presets.liu2017 import Config
-from wayfuse.radio.ap_estimation import estimate_places
 from wayfuse.radio.ap_hearing import DEFAULT_BANDS, known_levels
 from wayfuse.radio.ap_places import ApPlaces
 from wayfuse.radio.survey import Survey
-from wayfuse.tracking.dead_reckoning import Start
 from wayfuse.tracking.plain_engine import PlainEngine, PlainState
 from wayfuse.tracking.tracker import Tracker
 
-__all__ = ["build", "known_places"]
+__all__ = ["build"]
 
 _PERIOD = 2.0  # s, between the scans of the paper, for which `walk_sigma` is
 
@@ -31,7 +29,6 @@ def build(
     survey: Survey | None,
     *,
     places: ApPlaces | None = None,
-    start: Start | None = None,
     config: Config | None = None,
     lag: float = 0.0,
     use_steps: bool = True,
@@ -56,19 +53,12 @@ def build(
         most=c.most,
         power=levels.power if levels is not None and c.levelled else None,
     )
-    told = start and KnownStart(
-        x=start.x,
-        y=start.y,
-        floor=start.floor,
-        sigma=c.start_sigma,
-        bias_sigma=c.heading_sigma,
-        scale_sigma=0.0,
-    )
+    about = KnownStart(sigma=c.start_sigma, bias_sigma=c.heading_sigma, scale_sigma=0.0)
     engine = PlainEngine(
         n_floors=len(site.floors),
         prior=prior_estimate(site),
-        first=ToldStart(told) if told else SequenceStart(observation=observation, bias_sigma=c.heading_sigma),
-        starts_unseen=told is not None,
+        first=SequenceStart(observation=observation, bias_sigma=c.heading_sigma),
+        told=ToldStart(about=about),
         motion=ProportionalNoise(
             step_length=c.step_length, distance_sigma=c.distance_sigma, turn_sigma=c.turn_sigma
         ),
@@ -80,26 +70,3 @@ def build(
         uses_steps=use_steps,
     )
     return Tracker(engine=engine, lag=lag)
-
-
-def known_places(site: Site, survey: Survey | None, places: ApPlaces | None) -> ApPlaces:
-    """The places given, else estimated from the survey.
-
-    Raises
-    ------
-    UsageError : there is neither, or the places name floors that the site does not have.
-    """
-    if places is None and survey is None:
-        raise UsageError(
-            "no places of access points", where="--access-points",
-            remedy="give --access-points FILE, or --radio-map to estimate them from",
-        )  # fmt: skip
-    if places is None and survey is not None:
-        return estimate_places(survey)
-    assert places is not None  # noqa: S101
-    if len(places) and int(places.floor.max()) >= len(site.floors):
-        raise UsageError(
-            f"an access point is on floor {int(places.floor.max())}, site {site.name} has {len(site.floors)}",
-            where="--access-points", remedy="give the places of this site",
-        )  # fmt: skip
-    return places

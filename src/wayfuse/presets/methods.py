@@ -17,10 +17,11 @@ from wayfuse.presets import baselines, fused
 from wayfuse.presets.catalogue import PAPERS
 from wayfuse.radio.ap_places import ApPlaces
 from wayfuse.radio.survey import Survey
-from wayfuse.tracking.dead_reckoning import Start
+from wayfuse.tracking.dead_reckoning import DeadReckoning, Start
+from wayfuse.tracking.plain_engine import PlainEngine
 from wayfuse.tracking.tracker import Tracker
 
-__all__ = ["CONFIGS", "FIXES", "build_from_start", "build_method"]
+__all__ = ["CONFIGS", "FIXES", "begun_at", "build_from_start", "build_method"]
 
 T = TypeVar("T")
 
@@ -47,21 +48,20 @@ def build_method(
     survey: Survey | None,
     *,
     places: ApPlaces | None = None,
-    start: Start | None = None,
     n_particles: int | None = None,
     lag: float = 0.0,
 ) -> Tracker[Any]:
     """The tracker of a method that needs no start; KeyError for another name.
 
     places : of the access points; systems that need them estimate them from the survey where None are given.
-    start : helps until the radio does. n_particles : None = the method's own number.
+    n_particles : None = the method's own number.
 
     Raises
     ------
     UsageError : something that the method needs is missing.
     """
     if name in PAPERS:
-        return _build_paper(name, site, survey, places, start, n_particles, lag)
+        return _build_paper(name, site, survey, places, n_particles, lag)
     if name == "fused-ranges":
         config = fused.Config() if n_particles is None else fused.Config(n_particles=n_particles)
         return fused.build_from_ranges(site, _given(name, places, "--access-points"), config, lag=lag)
@@ -85,12 +85,23 @@ def build_from_start(
     return fused.build_from_start(site, start, fused.Config(n_particles=n_particles), lag=lag)
 
 
+def begun_at(tracker: Tracker[Any], start: Start) -> Tracker[Any]:
+    """The tracker of a published system, or ``pdr``, of tracks that begin at a place that is told; nothing is refitted.
+
+    Raises
+    ------
+    UsageError : the method finds its start itself.
+    """
+    if not isinstance(tracker.engine, PlainEngine | DeadReckoning):
+        raise UsageError("this method finds its start itself", where="--start", remedy="leave it out")
+    return replace(tracker, engine=tracker.engine.begun_at(start))
+
+
 def _build_paper(
     name: str,
     site: Site,
     survey: Survey | None,
     places: ApPlaces | None,
-    start: Start | None,
     n_particles: int | None,
     lag: float,
 ) -> Tracker[Any]:
@@ -99,7 +110,7 @@ def _build_paper(
     config = module.Config()
     if n_particles is not None:
         config = replace(config, n_particles=n_particles)
-    tracker: Tracker[Any] = module.build(site, survey, places=places, start=start, config=config, lag=lag)
+    tracker: Tracker[Any] = module.build(site, survey, places=places, config=config, lag=lag)
     return tracker
 
 

@@ -9,7 +9,7 @@ from typing import Any
 
 from wayfuse.core.errors import RadioMapError
 from wayfuse.maps.site import Site
-from wayfuse.presets.fused import check_floors
+from wayfuse.presets.given import check_floors
 from wayfuse.presets.methods import build_method
 from wayfuse.radio.survey import Survey
 from wayfuse.radio.walk_survey import load

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 from wayfuse.core.errors import UsageError
@@ -57,6 +57,10 @@ class DeadReckoning:
     uses_scans: bool = False
     supports_lag: bool = False
     uses_vertical: bool = False
+
+    def begun_at(self, start: Start) -> DeadReckoning:
+        """The engine of tracks that begin elsewhere."""
+        return replace(self, start=start)
 
     def init(self, track: str, seed: int) -> DeadReckoningState:
         """State at the start."""

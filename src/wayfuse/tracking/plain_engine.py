@@ -7,7 +7,7 @@ floors, calibrated radii) is left out: this is the engine of the published syste
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple, Protocol, TypeAlias
 
 import numpy as np
@@ -29,13 +29,14 @@ from wayfuse.inertial.vertical import VerticalEvent
 from wayfuse.models.motion.pdr import StepInput
 from wayfuse.radio.survey import Fingerprint
 from wayfuse.sensors.records import Range
+from wayfuse.tracking.dead_reckoning import Start
 from wayfuse.tracking.engine import Known, RangeObservation, Why, unknown
 from wayfuse.tracking.estimate import Estimate
 from wayfuse.tracking.fixed_lag import recalled, remembered
 from wayfuse.tracking.floor_change import FloorChange, Movement
 from wayfuse.tracking.summary import Summary, summarise
 
-__all__ = ["First", "PlainEngine", "PlainState", "ScanObservation", "Seen"]
+__all__ = ["First", "PlainEngine", "PlainState", "ScanObservation", "Seen", "Told"]
 
 Seen: TypeAlias = Fingerprint | Sequence[Range]
 _MEAN = Summary(median_iterations=0)
@@ -54,6 +55,14 @@ class First(Protocol):
 
     def draw(self, noise: Noise, seen: Seen | None, n: int, *, heading_known: bool) -> Cloud | None:
         """n particles for what was seen first (None: before anything was); None where that does not do for a start."""
+        ...
+
+
+class Told(First, Protocol):
+    """Where a track begins that is told its place."""
+
+    def at(self, x: float, y: float, floor: int, /) -> First:
+        """The same about x, y (m) on a floor (index)."""
         ...
 
 
@@ -91,7 +100,8 @@ class PlainEngine:
 
     Parameters
     ----------
-    n_floors : of the site. prior : the estimate before the start. first : where the track starts. motion : of steps.
+    n_floors : of the site. prior : the estimate before the start. first : where the track starts, told : where it
+    starts if it is told. motion : of steps.
     observation : of scans, ranging : of ranges, None = not looked at; one of the two is needed. standing : motion of
     the seconds since the last scan, at a scan before which no step was made, None = none. quiet : motion while
     motion sensors are silent, the event is seconds. constraint : of steps. steps : predicts by steps, ``filter`` does
@@ -102,6 +112,7 @@ class PlainEngine:
     n_floors: int
     prior: Estimate
     first: First
+    told: Told
     motion: MotionModel[StepInput]
     quiet: MotionModel[float]
     observation: ScanObservation | None = None
@@ -138,6 +149,10 @@ class PlainEngine:
     def uses_vertical(self) -> bool:
         """Whether movements between floors change it."""
         return self.floor_change is not None
+
+    def begun_at(self, start: Start) -> PlainEngine:
+        """The engine of tracks that begin at a place that is told."""
+        return replace(self, first=self.told.at(*start), starts_unseen=True)
 
     def init(self, track: str, seed: int) -> PlainState:
         """State before the first record."""
