@@ -18,7 +18,7 @@ from wayfuse.radio.interpolated_map import InterpolatedMap
 from wayfuse.radio.survey import Fingerprint, Fix
 from wayfuse.sensors.records import Range
 
-__all__ = ["Anywhere", "LikelyPlaces", "NearestPlaces"]
+__all__ = ["AnywhereAtRest", "LikelyPlaces", "NearestPlaces"]
 
 
 class _Locates(Protocol):
@@ -29,7 +29,7 @@ class _Locates(Protocol):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Anywhere:
+class AnywhereAtRest:
     """Particles uniform over the walkable space of a building. walkable : mask per floor."""
 
     walkable: tuple[Walkable, ...]

@@ -30,7 +30,7 @@ from wayfuse.models.motion.pdr import StepInput
 from wayfuse.models.motion.random_connectors import RandomConnectors
 from wayfuse.models.observation.mapped import MapLikelihood
 from wayfuse.models.relocation import Relocation
-from wayfuse.models.scan_start import Anywhere, LikelyPlaces
+from wayfuse.models.scan_start import AnywhereAtRest, LikelyPlaces
 from wayfuse.radio.interpolated_map import InterpolatedMap
 from wayfuse.radio.survey import Fingerprint
 from wayfuse.tracking.floor_change import FloorChange, Movement
@@ -206,12 +206,12 @@ class _Sepf:
         return _Track(state, track.movement, speed)
 
 
-def _anywhere(site: Site) -> Anywhere:
-    return Anywhere(walkable=tuple(floor.walkable for floor in site.floors))
+def _anywhere(site: Site) -> AnywhereAtRest:
+    return AnywhereAtRest(walkable=tuple(floor.walkable for floor in site.floors))
 
 
 def _begun(
-    key: tuple[int, int], state: FilterState | None, first: Anywhere, second: Second, n: int
+    key: tuple[int, int], state: FilterState | None, first: AnywhereAtRest, second: Second, n: int
 ) -> FilterState | None:
     if state is not None or second.scan is None:
         return state
