@@ -10,7 +10,7 @@ import pytest
 from wayfuse.core.errors import ConfigError
 from wayfuse.core.philox import Noise
 from wayfuse.models.constraint.barriers import Barriers
-from wayfuse.models.scan_start import Anywhere, LikelyPlaces, NearestPlaces
+from wayfuse.models.scan_start import AnywhereAtRest, LikelyPlaces, NearestPlaces
 from wayfuse.radio import interpolated_map, knn
 from wayfuse.radio.survey import Fingerprint
 
@@ -23,7 +23,7 @@ def row_of(survey: Any, row: int) -> Fingerprint:
 
 def test_anywhere_is_uniform_over_the_walkable_space_of_all_floors(world: Any) -> None:
     masks = tuple(floor.walkable for floor in world.site.floors)
-    cloud = Anywhere(walkable=masks).draw(Noise.of(0, "a"), None, 20_000, heading_known=True)
+    cloud = AnywhereAtRest(walkable=masks).draw(Noise.of(0, "a"), None, 20_000, heading_known=True)
     for f, mask in enumerate(masks):
         on = cloud.floor == f
         assert mask.contains(cloud.x[on], cloud.y[on]).all()
