@@ -46,14 +46,14 @@ def test_help_loads_nothing_heavy(arguments: tuple[str, ...]) -> None:
     assert not loaded & set(HEAVY)
 
 
-def test_tracking_loads_no_plots_and_no_statistics(world: Any, tmp_path: Path) -> None:
+def test_tracking_loads_neither_plots_nor_statistics_nor_test_tools(world: Any, tmp_path: Path) -> None:
     walk = sorted((world.folder / "walks").rglob("*.txt"))[0]
     _, loaded = modules_of(
         "track", str(world.folder / "SITE"), str(walk), "--radio-map", str(world.folder / "map.npz"),
         "--particles", "20", "--out", str(tmp_path / "EST.csv"),
     )  # fmt: skip
     assert (tmp_path / "EST.csv").exists()
-    banned = ("matplotlib", "scipy.stats", "scipy.signal", "sklearn", "shapely")
+    banned = ("matplotlib", "scipy", "sklearn", "shapely", "networkx", "unittest", "numpy.testing")
     assert not [name for name in banned if name in loaded]
 
 

@@ -44,3 +44,25 @@ def test_a_walk_is_tracked_whole_without_the_compiler(
     # rounding may turn one particle's ancestor: the estimate of sixty then moves by a sixtieth of the cloud
     assert max(far) < 0.5
     assert np.median(far) < 0.01
+
+
+AFTERWARDS = """
+import sys
+from wayfuse.core.jit import COMPILED, kernel, load_compiler
+load_compiler()
+assert COMPILED == ("numba.np.arraymath" in sys.modules)
+assert "scipy" not in sys.modules
+import scipy.linalg.cython_blas
+load_compiler()  # leaves alone what is loaded
+assert sys.modules["scipy.linalg"] is scipy.linalg
+import numpy as np
+from wayfuse.radio._kernels import nearest
+index, best = np.empty(2, np.int32), np.empty(2, np.float32)
+nearest(np.array([3, 1, 2], np.float32), 2, index, best)
+print(index)
+"""
+
+
+def test_what_the_compiler_is_kept_from_can_be_loaded_afterwards() -> None:
+    done = subprocess.run([sys.executable, "-c", AFTERWARDS], capture_output=True, text=True, check=False)
+    assert done.stdout == "[1 2]\n", done.stderr[-3000:]

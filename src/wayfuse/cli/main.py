@@ -5,6 +5,8 @@
 
 from __future__ import annotations
 
+import atexit
+import gc
 import importlib
 import sys
 from typing import Any
@@ -15,6 +17,8 @@ from wayfuse import __version__
 from wayfuse.core.errors import WayfuseError
 
 __all__ = ["LazyGroup", "cli", "main"]
+
+_YOUNG = 50_000  # objects made before the collector looks: imports make many and leave no garbage
 
 # name -> (module:attribute, the line that help shows)
 COMMANDS: dict[str, tuple[str, str]] = {
@@ -74,6 +78,8 @@ def cli() -> None:
 
 def main() -> None:
     """Run the command line; errors a user can mend are one line and exit status 2."""
+    gc.set_threshold(_YOUNG)
+    atexit.register(gc.freeze)  # no last look through all that the compiler has made
     try:
         status = cli.main(prog_name="wayfuse", standalone_mode=False)
         if isinstance(status, int) and status:  # what a command gave to `Exit` comes back as a value

@@ -78,10 +78,12 @@ def track(
     from wayfuse import __version__
     from wayfuse.cli.track_work import Worker
     from wayfuse.cli.work import check_target, map_recordings, report_faults
+    from wayfuse.core.jit import load_compiler
     from wayfuse.evaluation.estimates_file import Sidecar, open_writer
     from wayfuse.formats.reading import expand
 
     check_target(out)
+    load_compiler()
     methods = tuple(dict.fromkeys(methods))
     paths = list({path.resolve(): path for path in expand(recordings)}.values())
     _check_names(paths)

@@ -10,17 +10,34 @@ vectorised. Without numba, or with ``NUMBA_DISABLE_JIT=1``, every kernel runs as
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from importlib import import_module
 from typing import Any, TypeVar, cast
 
-__all__ = ["COMPILED", "bounded_kernel", "fast_kernel", "inline_kernel", "kernel"]
+__all__ = ["COMPILED", "bounded_kernel", "fast_kernel", "inline_kernel", "kernel", "load_compiler"]
 
 F = TypeVar("F", bound=Callable[..., Any])
 
 
+@contextmanager
+def _absent(*names: str) -> Iterator[None]:
+    """Optional modules as if they were not installed, but for those that are loaded already."""
+    hidden = [name for name in names if name not in sys.modules]
+    sys.modules.update(dict.fromkeys(hidden))  # type: ignore[arg-type]  # an import of them then fails
+    try:
+        yield
+    finally:
+        for name in hidden:
+            del sys.modules[name]
+
+
 def _compiler() -> Any:
     try:
-        import numba
+        # numba only asks whether coverage is measured (where it is, the module is loaded) and how old scipy is
+        with _absent("coverage", "scipy"):
+            import numba
     except ImportError:  # the same results, within rounding, at the speed of Python
         return None
     return numba
@@ -29,6 +46,17 @@ def _compiler() -> Any:
 _NUMBA = _compiler()
 COMPILED: bool = _NUMBA is not None and not _NUMBA.config.DISABLE_JIT
 """Whether kernels are compiled; as plain Python they mention integers that wrap around (`numpy.errstate`)."""
+
+
+def load_compiler() -> None:
+    """Load what the first call of a kernel loads, all but `scipy.linalg`, which takes longer than the rest of it.
+
+    numba looks there for BLAS. No kernel uses it, but other code compiled in this process might: call this from a
+    program that has the process to itself, before the first kernel.
+    """
+    if COMPILED:
+        with _absent("scipy", "scipy.linalg"):
+            import_module("numba.np.arraymath")
 
 
 def kernel(function: F) -> F:
