@@ -10,7 +10,8 @@ import pytest
 from wayfuse.core.errors import RadioMapError
 from wayfuse.core.types import Array
 from wayfuse.maps.site import Site
-from wayfuse.papers.li2015_channel import room_places, survey_distances
+from wayfuse.models.channel_survey import anchor_distances
+from wayfuse.papers.li2015_channel import room_places
 from wayfuse.presets.li2015 import Config
 from wayfuse.presets.li2015_tracker import build
 from wayfuse.radio.ap_places import ApPlaces
@@ -32,7 +33,8 @@ class Room:
 
     def surveyed(self) -> tuple[list[CsiFrame], Array]:
         frames = [frame for made in self.survey for frame in made.recording.csi]
-        return frames, np.concatenate([survey_distances(made.recording, self.places) for made in self.survey])
+        recordings = [made.recording for made in self.survey]
+        return frames, np.concatenate([anchor_distances(self.site, r, self.places) for r in recordings])
 
 
 @pytest.fixture(scope="module")

@@ -15,6 +15,7 @@ import numpy as np
 from wayfuse.core.types import Array
 from wayfuse.evaluation.results_folds import Mapper
 from wayfuse.maps.site import Site
+from wayfuse.models.channel_survey import anchor_distances
 from wayfuse.models.observation.ranges import Exponents
 from wayfuse.papers.reproduction import Table, mean_interval
 from wayfuse.presets.li2015 import Config
@@ -28,7 +29,7 @@ from wayfuse.simulator.experiment import SimulatedWalk, World, make_world, plan_
 from wayfuse.simulator.scenario_file import find_scenario, load_scenario_file
 from wayfuse.tracking.estimate import State
 
-__all__ = ["channel_table", "room_errors", "room_places", "survey_distances"]
+__all__ = ["channel_table", "room_errors", "room_places"]
 
 _SCENARIO = "csi-room"
 _SEEDS = 6  # rooms
@@ -58,15 +59,6 @@ def room_places(world: World, anchors: Sequence[int]) -> ApPlaces:
     )
 
 
-def survey_distances(recording: Recording, places: ApPlaces) -> Array:
-    """Distance (n,) m of the surveyor to the anchor of each frame, straight between stated points; NaN outside."""
-    points = np.array([w[:3] for w in recording.waypoints])
-    t = np.array([frame.t for frame in recording.csi])
-    x, y = (np.interp(t, points[:, 0], points[:, k], np.nan, np.nan) for k in (1, 2))
-    rows = places.rows(np.array([frame.anchor for frame in recording.csi], np.uint64))
-    return np.asarray(np.hypot(places.x[rows] - x, places.y[rows] - y))
-
-
 def room_errors(seed: int) -> dict[str, float]:
     """Mean error (m) of each row over the walks of one room."""
     path = find_scenario(_SCENARIO)
@@ -75,7 +67,7 @@ def room_errors(seed: int) -> dict[str, float]:
     survey = [m.recording for m in made if m.plan.role == "survey"]
     places = room_places(world, sorted({frame.anchor for r in survey for frame in r.csi}))
     frames = [frame for recording in survey for frame in recording.csi]
-    models = fit_anchors(frames, np.concatenate([survey_distances(r, places) for r in survey]))
+    models = fit_anchors(frames, np.concatenate([anchor_distances(site, r, places) for r in survey]))
     period = world.scenario.csi.period_s
     grouper = PacketGrouper(anchors=tuple(models), wait=0.8 * period, window=0.5 * period)
     errors: dict[str, list[float]] = {name: [] for name in (*_ROWS, _FIX)}

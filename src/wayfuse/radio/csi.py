@@ -22,10 +22,11 @@ from wayfuse.core.errors import ConfigError
 from wayfuse.core.types import Array, IntArray
 from wayfuse.sensors.records import CsiFrame
 
-__all__ = ["INTEL5300_20MHZ", "direct_path_power", "fourier_order", "impulse_response"]
+__all__ = ["INTEL5300_20MHZ", "direct_path_power", "fourier_order", "impulse_response", "subcarriers_of"]
 
 # subcarriers of the 30 groups at 20 MHz (IEEE 802.11n, grouping 2)
 INTEL5300_20MHZ: IntArray = np.array([*range(-28, -1, 2), -1, *range(1, 28, 2), 28])
+_TRANSFORMS = (64, 128, 256)  # values of 20, 40 and 80 MHz
 _OVERSAMPLING = 4  # taps per 1 / bandwidth: between two of 1 / bandwidth a peak would lose up to 3.9 dB
 
 
@@ -36,6 +37,22 @@ def fourier_order(n: int) -> IntArray:
     [0, 1, -2, -1]
     """
     return np.asarray((np.arange(n) + n // 2) % n - n // 2)
+
+
+def subcarriers_of(n: int) -> IntArray:
+    """Subcarriers of channel state of n values: the groups of an Intel 5300, else the order of a Fourier transform.
+
+    Raises
+    ------
+    ConfigError : no card that is known gives so many.
+    """
+    if n == len(INTEL5300_20MHZ):
+        return INTEL5300_20MHZ
+    if n not in _TRANSFORMS:
+        raise ConfigError(
+            f"channel state of {n} subcarriers", remedy=f"30 (Intel 5300) and {_TRANSFORMS} are known"
+        )
+    return fourier_order(n)
 
 
 def impulse_response(

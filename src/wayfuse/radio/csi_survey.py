@@ -17,7 +17,7 @@ from wayfuse.core.types import Array, IntArray
 from wayfuse.radio.csi import INTEL5300_20MHZ, direct_path_power
 from wayfuse.radio.packet_groups import GroupCounts, PacketGrouper, group, group_ranges
 from wayfuse.radio.ranging import RangeRegression, fit_antennas
-from wayfuse.sensors.records import CsiFrame, Range
+from wayfuse.sensors.records import CsiFrame, Range, bssid_text
 
 __all__ = ["channel_ranges", "fit_anchors"]
 
@@ -53,7 +53,7 @@ def fit_anchors(
         points, at = _points(power, distances[mine])
         if len(at) < 2:
             raise RadioMapError(
-                f"an anchor with {len(at)} surveyed distances of {_LEAST} frames and more",
+                f"anchor {bssid_text(anchor)} has {len(at)} surveyed distances of {_LEAST} frames and more",
                 where="fit_anchors",
                 remedy="survey it near and far",
             )

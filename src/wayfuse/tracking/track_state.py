@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from typing import Any, Generic, NamedTuple, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -15,6 +15,9 @@ from wayfuse.sensors.quality import Verdict
 from wayfuse.sensors.recording import Recording
 from wayfuse.sensors.records import Range
 from wayfuse.tracking.estimate import Estimate
+
+if TYPE_CHECKING:
+    from wayfuse.radio.channel_ranging import ChannelState
 
 __all__ = ["FAR", "LONGEST_GAP", "Batch", "Replay", "Track", "TrackState", "is_even"]
 
@@ -40,6 +43,7 @@ class TrackState(NamedTuple, Generic[S]):
     diffused: float = -np.inf
     pending: tuple[float, ...] = ()
     ranges: tuple[Range, ...] = ()  # of the present moment, which may not be over
+    channel: ChannelState | None = None  # the moment of channel state that is not over
     is_told: bool = False  # the phone works out its own steps, and their headings with them
 
 

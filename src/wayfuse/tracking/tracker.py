@@ -14,7 +14,8 @@ import heapq
 import math
 from collections import Counter
 from dataclasses import dataclass, field, replace
-from typing import Generic, TypeVar
+from operator import attrgetter
+from typing import TYPE_CHECKING, Generic, TypeVar
 
 import numpy as np
 
@@ -27,6 +28,7 @@ from wayfuse.sensors.quality import Verdict
 from wayfuse.sensors.recording import Recording
 from wayfuse.sensors.records import (
     Acceleration,
+    CsiFrame,
     MagneticField,
     Orientation,
     Pressure,
@@ -37,10 +39,13 @@ from wayfuse.sensors.records import (
     Waypoint,
     WifiScan,
 )
-from wayfuse.tracking import told_step
 from wayfuse.tracking.engine import Engine, Known
 from wayfuse.tracking.estimate import Estimate
+from wayfuse.tracking.record_checks import judge_range, judge_step, step_event
 from wayfuse.tracking.track_state import FAR, LONGEST_GAP, Batch, Replay, Track, TrackState, is_even
+
+if TYPE_CHECKING:
+    from wayfuse.radio.channel_ranging import ChannelRanging
 
 __all__ = ["Batch", "Track", "TrackState", "Tracker"]
 
@@ -48,7 +53,6 @@ S = TypeVar("S")
 
 _MOTION = (Acceleration, RotationRate, MagneticField, Orientation, Pressure)
 _QUIET_AFTER = 2.0  # s without motion sensors until a method diffuses (a standing phone still reports)
-_LONGEST_RANGE = 1e3  # m; no radio ranges further indoors
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -59,6 +63,7 @@ class Tracker(Generic[S]):
     ----------
     engine : the positioning method. front_end, vertical, scan_buffer : motion records to steps, motion records and
     pressure to movements between floors, scans to fingerprints.
+    channel : channel state to ranges; None = it is not looked at.
     interval : s, longest time between estimates. lag : s, estimates are given this much later and better.
     """
 
@@ -66,8 +71,10 @@ class Tracker(Generic[S]):
     front_end: InertialFrontEnd = field(default_factory=InertialFrontEnd)
     vertical: VerticalFrontEnd = field(default_factory=VerticalFrontEnd)
     scan_buffer: ScanBuffer = field(default_factory=ScanBuffer)
+    channel: ChannelRanging | None = None
     interval: float = 1.0
     lag: float = 0.0
+    _telling: tuple[type, ...] = field(init=False, repr=False)  # records that end a silence
 
     def __post_init__(self) -> None:
         if not self.interval > 0.0 or not self.lag >= 0.0:
@@ -76,6 +83,8 @@ class Tracker(Generic[S]):
             )
         if self.lag > 0.0 and not self.engine.supports_lag:
             raise UsageError("this method has no lag", where="--lag", remedy="leave --lag out, or use fused")
+        ranging = (Range, *((CsiFrame,) if self.channel else ())) if self.engine.uses_ranges else ()
+        object.__setattr__(self, "_telling", (Acceleration, WifiScan, Step, *ranging))
 
     def init(self, name: str, seed: int = 0) -> TrackState[S]:
         """State before the first record of a track; equal names and seeds give equal bits."""
@@ -99,9 +108,8 @@ class Tracker(Generic[S]):
         if record.t < state.now:
             return state, [], Verdict.LATE
         out: list[Estimate] = []
-        if state.ranges and record.t > state.ranges[0].t:
-            state = self._ranges(state, out)
-        is_heard = isinstance(record, Acceleration | WifiScan | Range | Step)
+        state = self._moments(state, record.t, out)
+        is_heard = isinstance(record, self._telling)
         is_paused = state.now > -np.inf and record.t - state.now > LONGEST_GAP
         if is_paused or (is_heard and record.t - state.last_heard > LONGEST_GAP):
             state = self._restart(state, record.t, out)
@@ -116,14 +124,16 @@ class Tracker(Generic[S]):
             return state, out, verdict
         if isinstance(record, Step):
             return self._told(state, record, out)
+        if isinstance(record, CsiFrame) and self.channel is not None and CsiFrame in self._telling:
+            channel, verdict = self.channel.step(state.channel, record)
+            return state._replace(channel=channel), out, verdict
         if not isinstance(record, _MOTION):
-            return state, out, Verdict.IGNORED  # BLE, channel state: no model yet
+            return state, out, Verdict.IGNORED  # BLE: no model yet
         front_end, event = self.front_end.step(state.front_end, record)
         state = state._replace(front_end=front_end)
         if isinstance(record, Acceleration):
             state = state._replace(last_motion=record.t)
-        if state.is_told:
-            event = None
+        event = None if state.is_told else event
         if event is not None:
             state = self._step_event(state, event, out)
         if self.engine.uses_vertical:
@@ -149,10 +159,10 @@ class Tracker(Generic[S]):
         self, state: TrackState[S], record: Step, out: list[Estimate]
     ) -> tuple[TrackState[S], list[Estimate], Verdict]:
         """Take a step that the phone worked out itself; from then on its samples make none."""
-        verdict = told_step.judge(record)
+        verdict = judge_step(record)
         if verdict is not Verdict.USED:
             return state, out, verdict
-        event = told_step.to_event(record)
+        event = step_event(record)
         state = self._step_event(state._replace(is_told=True), event, out)
         if self.engine.uses_vertical:
             state = self._foot(state, event, out)
@@ -161,7 +171,7 @@ class Tracker(Generic[S]):
     def flush(self, state: TrackState[S], until: float) -> tuple[TrackState[S], list[Estimate]]:
         """The estimates still due up to a time, and those that wait for their lag."""
         out: list[Estimate] = []
-        state = self._finish(self._ranges(state, out), until, out, None)
+        state = self._finish(self._moments(state, np.inf, out), until, out, None)
         return state, out
 
     def run(self, recording: Recording, seed: int = 0) -> Track:
@@ -177,7 +187,11 @@ class Tracker(Generic[S]):
         if recording.is_empty:
             return Batch(state, [], Counter(), Counter())
         # ranges and steps are few; the array path is for what is many
-        few = recording.steps or (self.engine.uses_ranges and (recording.ranges or state.ranges))
+        waiting = state.ranges or state.channel is not None
+        ranging = (Range in self._telling and recording.ranges) or (
+            CsiFrame in self._telling and recording.csi
+        )
+        few = recording.steps or waiting or ranging
         if few or not is_even(state, recording):
             return self._extend_by_record(state, recording)
         out: list[Estimate] = []
@@ -233,7 +247,7 @@ class Tracker(Generic[S]):
             StepEvent(*row) for row in zip(*(column.tolist() for column in steps), strict=True)
         ]
         # in time order, a step before what is reported at its time
-        for event in heapq.merge(feet, vertical, key=_time):
+        for event in heapq.merge(feet, vertical, key=attrgetter("t")):
             state = self._advance(state, event.t, out, replay)
             if isinstance(event, StepEvent):
                 state = self._step_event(state, event, out)
@@ -333,13 +347,19 @@ class Tracker(Generic[S]):
         """Keep a range until its moment is over: those of one time are looked at together."""
         if not self.engine.uses_ranges:
             return state, Verdict.IGNORED
-        if not math.isfinite(record.distance):
-            return state, Verdict.NOT_FINITE
-        if abs(record.distance) > _LONGEST_RANGE:
-            return state, Verdict.OUT_OF_RANGE
-        if any(other.anchor == record.anchor for other in state.ranges):
-            return state, Verdict.DUPLICATE
-        return state._replace(ranges=(*state.ranges, record)), Verdict.USED
+        verdict = judge_range(record, state.ranges)
+        return (state._replace(ranges=(*state.ranges, record)) if verdict is Verdict.USED else state), verdict
+
+    def _moments(self, state: TrackState[S], t: float, out: list[Estimate]) -> TrackState[S]:
+        """Look at what was heard in moments that are over by t."""
+        if state.ranges and t > state.ranges[0].t:
+            state = self._ranges(state, out)
+        if state.channel is None or self.channel is None or t < self.channel.end_of(state.channel):
+            return state
+        end = min(self.channel.end_of(state.channel), t if math.isfinite(t) else state.now)
+        ranges = self.channel.ranges(state.channel, end)
+        state = self._advance(state._replace(channel=None), end, out, None)
+        return self._ranges(state._replace(ranges=ranges), out)
 
     def _ranges(self, state: TrackState[S], out: list[Estimate]) -> TrackState[S]:
         """Look at the ranges of a moment that is over."""
@@ -377,7 +397,3 @@ class Tracker(Generic[S]):
         engine, estimate = self.engine.recall(state.engine)
         out.append(estimate)
         return state._replace(engine=engine, pending=state.pending[1:])
-
-
-def _time(event: StepEvent | VerticalEvent) -> float:
-    return event.t
