@@ -83,6 +83,15 @@ def test_a_zone_that_is_no_longer_there_is_left_without_a_word() -> None:
     assert Zones([]).step(state, [_at(9.0, 5.0)]) == (ZoneState(9.0), [])
 
 
+def test_of_rooms_of_one_name_the_nearest_on_the_floor_is_meant() -> None:
+    same = [Zone(f"{floor}/{n}", "Toilet", floor, (SQUARE + n * EAST,)) for floor in (0, 1) for n in (0, 5)]
+    zones = Zones([*same, Zone("b", "Bar", 0, (SQUARE,))])
+    assert zones.called(("Toilet", "Bar", "gone"), _at(0.0, 2.0)) == ["0/0", "b"]
+    assert zones.called(("Toilet",), _at(0.0, 49.0)) == ["0/5"]
+    assert zones.called(("Toilet",), _at(0.0, 2.0, floor=1)) == ["1/0"]
+    assert zones.called(("Bar",), _at(0.0, 2.0, floor=1)) == ["b"]  # just gone upstairs
+
+
 # --- geofences ----------------------------------------------------------------------------------------------
 
 
@@ -140,6 +149,17 @@ def test_a_phone_enters_a_geofence_and_a_crash_changes_nothing_of_it(world: Any,
         fence = [e for e in events if e["kind"] == "geofence"]
         assert [e["event"] for e in fence][:1] == ["enter"]
         feature = app.get("/api/v1/positions").json()["features"][0]["properties"]
+        drawn = app.get("/api/v1/zones").json()["features"]
+        fenced = {f["properties"]["id"]: f for f in drawn if f["properties"]["kind"] == "geofence"}
+        assert len(drawn) - len(fenced) == len(rooms_of(world.site))
+        told = json.loads((tmp_path / "f.json").read_text())["features"]
+        np.testing.assert_allclose(
+            fenced["fence/0"]["geometry"]["coordinates"], told[0]["geometry"]["coordinates"], atol=2e-8
+        )
+        inside = app.get("/api/v1/zones/inside").json()["inside"]
+        named = {f["properties"]["id"]: f["properties"]["name"] for f in drawn}
+        assert {named[zone] for zone in inside} == set(feature["zones"])
+        assert {track for tracks in inside.values() for track in tracks} <= {feature["track"]}
         assert fence[0]["name"] in feature["zones"] or len(fence) > 1
         shutil.copytree(tmp_path / "a", tmp_path / "b")  # what a crash leaves
     with started(world, tmp_path / "b", **settings) as again:

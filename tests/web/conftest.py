@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import shutil
 import sys
@@ -12,6 +13,7 @@ from typing import Any, NoReturn
 
 import pytest
 
+from wayfuse.maps.site import Site
 from wayfuse.sensors.recording import Recording
 from wayfuse.service.replay import envelopes
 from wayfuse.service.web.build import ASSETS
@@ -93,10 +95,23 @@ class Phone:
 
 @pytest.fixture(scope="session")
 def served(house: House, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Running]:
-    """The house, served."""
+    """The house, served; a geofence covers each floor."""
     data = tmp_path_factory.mktemp("server")
-    with running(house.folder, data, "--radio-map", house.folder / "map.npz", particles=300) as server:
+    fences = data / "fences.json"
+    fences.write_text(json.dumps(_fences(Site.load(house.folder / "SITE"))), encoding="utf-8")
+    more = {"particles": 300, "geofences": fences}
+    with running(house.folder, data, "--radio-map", house.folder / "map.npz", **more) as server:
         yield server
+
+
+def _fences(site: Site) -> dict[str, Any]:
+    features = []
+    for floor in site.floors:
+        ring = floor.anchor.to_lonlat(floor.outline[0].exterior).tolist()
+        said = {"name": f"all of {floor.name}", "level": floor.name}
+        shape = {"type": "Polygon", "coordinates": [ring]}
+        features.append({"type": "Feature", "properties": said, "geometry": shape})
+    return {"type": "FeatureCollection", "features": features}
 
 
 @pytest.fixture(scope="session")

@@ -112,8 +112,9 @@ def test_floors_and_tabs_are_operated_from_the_keyboard(look: Callable[..., Any]
     assert page.level != before
     assert page.page.evaluate("() => document.activeElement.getAttribute('aria-checked')") == "true"
     page.page.focus("#tab-tracks")
-    page.page.keyboard.press("ArrowRight")
-    assert page.page.is_visible("#view-replay")
+    for shown in ("#view-zones", "#view-replay"):
+        page.page.keyboard.press("ArrowRight")
+        assert page.page.is_visible(shown)
     assert not page.page.is_visible("#view-tracks")
     page.page.keyboard.press("End")
     assert page.page.is_visible("#view-survey")
@@ -165,7 +166,7 @@ def test_a_phones_screen_has_room_for_all_of_it(look: Callable[..., Any], served
     page = look(viewport={"width": 360, "height": 740}, has_touch=True)
     page.enter(served.token)
     wide = "() => document.documentElement.scrollWidth <= document.documentElement.clientWidth"
-    for tab in ("#tab-tracks", "#tab-replay", "#tab-survey"):
+    for tab in ("#tab-tracks", "#tab-zones", "#tab-replay", "#tab-survey"):
         page.page.click(tab)
         assert page.page.evaluate(wide)
         box = page.page.locator(tab).bounding_box()
@@ -266,3 +267,36 @@ def test_a_place_is_recorded_by_a_press_on_the_map(look: Callable[..., Any], ser
     assert last["t"] > first["t"]
     page.page.click("text=Delete")
     page.until(lambda: "0 walks by hand" in page.page.inner_text("#view-survey"))
+
+
+def test_zones_are_drawn_with_who_is_inside(
+    look: Callable[..., Any], new_phone: Callable[[str], Any], served: Any
+) -> None:
+    phone = new_phone("visitor")
+    page = look()
+    page.enter(served.token)
+    page.page.click("#tab-zones")
+    entered: list[Any] = []
+    with served.client() as client:
+        while not entered and not phone.is_done:
+            phone.walk(5)
+            inside = client.get("/api/v1/zones/inside").json()["inside"]
+            entered = [zone for zone, tracks in inside.items() if phone.track in tracks]
+        (zone,) = [
+            f["properties"]
+            for f in client.get("/api/v1/zones").json()["features"]
+            if f["properties"]["id"] == entered[0]
+        ]
+    row = f"#view-zones [data-zone='{zone['id']}']"
+    page.until(lambda: page.page.is_visible(row))
+    page.until(lambda: f"entered {zone['name']}" in page.page.inner_text("#view-zones .crossings"))
+    page.page.click(row)
+    page.until(lambda: page.level == zone["level"])
+    drawn = (
+        "(id) => document.querySelector('#map').map.queryRenderedFeatures({layers: ['zones']})"
+        ".filter((f) => f.properties.id === id).map((f) => [f.properties.n, f.properties.chosen])"
+    )
+    page.until(lambda: any(n > 0 and chosen for n, chosen in page.page.evaluate(drawn, zone["id"])))
+    page.page.locator("#view-zones .zones .who").filter(has_text=phone.track[:6]).first.click()
+    page.page.click("#tab-tracks")
+    assert page.page.inner_text(".detail .state").startswith(phone.track[:6])

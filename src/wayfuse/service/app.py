@@ -25,6 +25,7 @@ from wayfuse.service.routes import (
     web_plan,
     web_radio,
     web_survey,
+    zones,
 )
 from wayfuse.service.security import SecurityHeaders
 from wayfuse.service.server import Server
@@ -69,7 +70,7 @@ def create_app(server: Server) -> FastAPI:
         redoc_url=None,
     )
     app.state.server, app.state.surveys = server, surveys
-    web = (web_plan, web_particles, web_radio, web_survey, web_assets)
+    web = (zones, web_plan, web_particles, web_radio, web_survey, web_assets)
     for part in (inputs, outputs, stream, admin, pages, *web):
         app.include_router(part.router)
     handle_problems(app)

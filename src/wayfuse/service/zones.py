@@ -8,7 +8,7 @@ floor. A lost track changes nothing. What is told depends on the estimates in th
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -77,6 +77,21 @@ class Zones:
 
     def __len__(self) -> int:
         return len(self._by_id)
+
+    def __iter__(self) -> Iterator[Zone]:
+        return iter(self._by_id.values())
+
+    def called(self, names: Sequence[str], e: Estimate) -> list[str]:
+        """Identifiers of the zones that somebody is in by name: of several of one name, the nearest on the floor."""
+        found = []
+        for name in names:
+            mine = [zone for zone in self if zone.name == name]
+            here = [zone for zone in mine if zone.floor == e.floor] or mine
+            if len(here) > 1 and np.isfinite(e.x) and np.isfinite(e.y):
+                place = np.array([e.x, e.y])
+                here.sort(key=lambda zone: distance_to_area(zone.rings, place))
+            found += [zone.id for zone in here[:1]]
+        return found
 
     def names(self, state: ZoneState) -> tuple[str, ...]:
         """Names of the zones somebody is in."""

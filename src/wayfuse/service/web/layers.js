@@ -8,7 +8,7 @@ const zoomed = (...stops) => ["interpolate", ["linear"], ["zoom"], ...stops];
 // rooms people walk in are lighter than what fills the rest of a floor
 const ROOMS = ["room", "walkway", "corridor", "hall", "office", "classroom", "lobby", "foyer", "conferenceroom"];
 
-export const SOURCES = ["plan", "radii", "trails", "particles", "dots", "points", "next"];
+export const SOURCES = ["plan", "radii", "trails", "particles", "dots", "points", "next", "zones"];
 
 const LAYERS = [
   { id: "ground", type: "background", paint: (p) => ({ "background-color": p.ground }) },
@@ -29,6 +29,14 @@ const LAYERS = [
   },
   { id: "edge", type: "line", source: "plan", filter: kind("outline"), paint: (p) => ({ "line-color": p.edge, "line-width": zoomed(15, 1, 20, 2) }) },
   {
+    id: "zones", type: "fill", source: "zones",
+    paint: (p) => ({ "fill-color": p.zone, "fill-opacity": ["case", ["get", "chosen"], 0.35, [">", ["get", "n"], 0], 0.2, 0] }),
+  },
+  {
+    id: "fences", type: "line", source: "zones", filter: kind("geofence"),
+    paint: (p) => ({ "line-color": p.zone, "line-width": 2, "line-dasharray": [4, 2] }),
+  },
+  {
     id: "landings", type: "symbol", source: "plan", filter: kind("landing"), minzoom: 17,
     layout: { "text-field": ["get", "label"], "text-font": FONT, "text-size": 11, "text-padding": 1, "text-max-width": 6 },
     paint: (p) => ({ "text-color": p.landing, "text-halo-color": p.halo, "text-halo-width": 1.5 }),
@@ -37,6 +45,11 @@ const LAYERS = [
     id: "unit-names", type: "symbol", source: "plan", filter: kind("unit"), minzoom: 17.5,
     layout: { "text-field": ["get", "name"], "text-font": FONT, "text-size": zoomed(17.5, 10, 21, 14), "text-max-width": 8, "text-padding": 4 },
     paint: (p) => ({ "text-color": p.text, "text-halo-color": p.halo, "text-halo-width": 1.5, "text-opacity": 0.85 }),
+  },
+  {
+    id: "fence-names", type: "symbol", source: "zones", filter: kind("geofence"), minzoom: 16,
+    layout: { "text-field": ["get", "name"], "text-font": FONT, "text-size": 12, "symbol-placement": "line", "text-offset": [0, 0.8] },
+    paint: (p) => ({ "text-color": p.zone, "text-halo-color": p.halo, "text-halo-width": 1.5 }),
   },
   { id: "radii-95", type: "fill", source: "radii", filter: ["==", ["get", "share"], 95], paint: () => ({ "fill-color": ["get", "colour"], "fill-opacity": 0.1 }) },
   { id: "radii-68", type: "fill", source: "radii", filter: ["==", ["get", "share"], 68], paint: () => ({ "fill-color": ["get", "colour"], "fill-opacity": 0.16 }) },

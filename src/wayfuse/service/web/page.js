@@ -11,6 +11,7 @@ import { startSurvey } from "/web/survey.js";
 import { startTabs } from "/web/tabs.js";
 import { startTheme } from "/web/theme.js";
 import { startTracks } from "/web/tracks.js";
+import { startZones } from "/web/zones.js";
 
 let listening = new AbortController();
 
@@ -70,12 +71,11 @@ async function start() {
     byId("tab-replay").click();
     return replay.replay(track);
   });
+  const parts = { "tab-zones": startZones(byId("view-zones"), map), "tab-replay": replay, "tab-survey": survey };
   let before = "tab-tracks";
   startTabs(document.querySelector("[role=tablist]"), (tab) => {
-    if (before === "tab-replay" && tab !== before) replay.left();
-    if (before === "tab-survey" && tab !== before) survey.left();
-    if (tab === "tab-replay") replay.opened();
-    if (tab === "tab-survey") survey.opened();
+    if (tab !== before) parts[before]?.left();
+    parts[tab]?.opened();
     before = tab;
   });
   byId("leave").addEventListener("click", () => {

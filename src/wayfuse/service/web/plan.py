@@ -14,8 +14,9 @@ from numpy.typing import ArrayLike
 from wayfuse.core.frames import GeoAnchor
 from wayfuse.core.types import Array
 from wayfuse.maps.site import Floor, Polygon, Site
+from wayfuse.service.zones import Zone
 
-__all__ = ["floor_features", "floor_frame", "frame_of"]
+__all__ = ["floor_features", "floor_frame", "frame_of", "zone_features"]
 
 _DECIMALS = 8  # of degrees: about 1 mm
 _NOWHERE = GeoAnchor.from_origin(0.0, 0.0)
@@ -56,6 +57,17 @@ def floor_features(site: Site, index: int) -> Json:
         features.append(_feature("unit", _polygon(frame, unit.polygon), said))
     features += _lines("wall", frame, floor.walls) + _lines("door", frame, floor.doors)
     features += _connectors(site, index, frame)
+    return {"type": "FeatureCollection", "features": features}
+
+
+def zone_features(site: Site, zones: Iterable[Zone]) -> Json:
+    """A GeoJSON FeatureCollection of rooms and geofences; ``kind`` is room or geofence."""
+    features = []
+    for zone in zones:
+        rings = _rings(frame_of(site.floors[zone.floor]), zone.rings)
+        said = {"id": zone.id, "name": zone.name, "floor": zone.floor, "level": site.floors[zone.floor].name}
+        kind = "geofence" if zone.is_fence else "room"
+        features.append(_feature(kind, {"type": "Polygon", "coordinates": rings}, said))
     return {"type": "FeatureCollection", "features": features}
 
 

@@ -24,7 +24,7 @@ export function startReplay(view, map) {
     const { tracks } = await get("/api/v1/tracks", { site: store.site });
     const kept = choose.value;
     choose.replaceChildren(el("option", { value: "", textContent: tracks.length ? "Choose a track" : "No track yet" }), ...tracks.map((t) =>
-      el("option", { value: t.track, textContent: `${short(t.track)}  ${new Date(1000 * t.started).toLocaleString()}, ${duration(t.heard - t.started)}${t.is_live ? ", live" : ""}` })));
+      el("option", { value: t.track, textContent: `${short(t.track)}  ${new Date(1000 * t.started).toLocaleString([], { dateStyle: "short", timeStyle: "short" })}, ${duration(t.heard - t.started)}${t.is_live ? ", live" : ""}` })));
     if (tracks.some((t) => t.track === kept)) choose.value = kept;
   };
 

@@ -5,6 +5,7 @@ import { Frame } from "/web/frames.js";
 
 const TRAIL = 240; // places kept of each track
 const QUIET_S = 30; // without a word a track is drawn pale
+const CROSSINGS = 100; // zones entered and left that are kept
 const GONE_S = 900; // and then no longer; it can still be replayed
 
 const hasPlace = (p) => p.x !== null && p.state !== "initialising";
@@ -18,6 +19,7 @@ class Store extends EventTarget {
   following = true;
   tracks = new Map(); // by name: { p (properties of its last position), trail, changed }
   plans = new Map();
+  crossings = []; // rooms and geofences entered and left since the page was opened, the last first
   ahead = 0; // s, the server's clock before this one's
 
   tell(what) {
@@ -38,6 +40,7 @@ class Store extends EventTarget {
     this.floors = floors.map((f) => ({ ...f, frame: new Frame(f) }));
     this.tracks.clear();
     this.plans.clear();
+    this.crossings = [];
     this.selected = "";
     const ground = this.floors.findIndex((f) => f.elevation_m >= 0);
     this.floor = Math.max(ground, 0);
@@ -92,8 +95,14 @@ class Store extends EventTarget {
       this.ahead = p.heard - Date.now() / 1000;
       this.#place(p, data.changed);
     }
+    if (event === "zone") this.#cross(data);
     for (const [track, { p }] of this.tracks) if (track !== this.selected && this.now - p.heard > GONE_S) this.tracks.delete(track);
     this.tell("tracks");
+  }
+
+  #cross(crossing) {
+    this.crossings = [crossing, ...this.crossings].slice(0, CROSSINGS);
+    this.tell("zones");
   }
 
   #place(p, changed) {

@@ -8,12 +8,12 @@ export const PALETTES = {
   light: {
     ground: "#eef0f2", floor: "#ffffff", edge: "#8a949e", unit: "#e3e8ee", room: "#f4f6f8", unitEdge: "#b4bec8",
     wall: "#59636e", door: "#ffffff", connector: "#d9cdf2", landing: "#6f42c1", text: "#24292f", halo: "#ffffff",
-    next: "#bc4c00", point: "#116329", dotEdge: "#ffffff", lost: "#b35900",
+    next: "#bc4c00", point: "#116329", dotEdge: "#ffffff", lost: "#b35900", zone: "#0a6c74",
   },
   dark: {
     ground: "#0d1117", floor: "#1b2129", edge: "#6e7a86", unit: "#2a323c", room: "#222932", unitEdge: "#46525e",
     wall: "#9aa6b2", door: "#1b2129", connector: "#3c2f5c", landing: "#b99cf0", text: "#e6edf3", halo: "#0d1117",
-    next: "#f0883e", point: "#56d364", dotEdge: "#0d1117", lost: "#f0883e",
+    next: "#f0883e", point: "#56d364", dotEdge: "#0d1117", lost: "#f0883e", zone: "#4cc9d4",
   },
 };
 

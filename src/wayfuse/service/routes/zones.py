@@ -1,0 +1,53 @@
+"""Rooms and geofences of a site, and who is in which."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+from fastapi import APIRouter, Depends, Query, Request
+
+from wayfuse.service.access import SCHEME, allowed, server_of, site_of
+from wayfuse.service.problems import responses
+from wayfuse.service.web.plan import zone_features
+from wayfuse.storage.tokens import Token
+
+__all__ = ["router"]
+
+router = APIRouter(
+    prefix="/api/v1/zones",
+    tags=["out"],
+    dependencies=[Depends(SCHEME)],
+    responses=responses(401, 403, 422, 429),
+)
+
+Reader = Annotated[Token, Depends(allowed("read"))]
+Site = Annotated[str, Query(max_length=200, description="Name of the site; not needed where there is one.")]
+_INSIDE: dict[int | str, dict[str, Any]] = {
+    200: {
+        "content": {
+            "application/json": {"example": {"site": "museum", "inside": {"F1/12": ["9f86d081884c7d65"]}}}
+        }
+    }
+}
+
+
+@router.get("", summary="Rooms and geofences")
+def zones(request: Request, token: Reader, site: Site = "") -> dict[str, Any]:
+    """GeoJSON: ``id``, ``name``, ``kind`` (room or geofence), ``floor`` and ``level`` of each."""
+    server = server_of(request)
+    world = server.worlds[site_of(server, token, site)]
+    return zone_features(world.site, world.zones)
+
+
+@router.get("/inside", summary="Who is in which room or geofence", responses=_INSIDE)
+def inside(request: Request, token: Reader, site: Site = "") -> dict[str, Any]:
+    """Tracks by ``id`` of the zone; zones that nobody is in are left out, and so are tracks that have ended."""
+    server = server_of(request)
+    name = site_of(server, token, site)
+    world = server.worlds[name]
+    found: dict[str, list[str]] = {}
+    for view in server.live.views(name):
+        if view.estimate is not None and not view.is_ended:
+            for zone in world.zones.called(view.zones, view.estimate):
+                found.setdefault(zone, []).append(view.row.track)
+    return {"site": name, "inside": found}
