@@ -3,29 +3,19 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
 from wayfuse.cli.site_route import route_command
 from wayfuse.cli.site_validate import validate_command
+from wayfuse.maps.importers.catalogue import IMPORTERS, floor_rows, import_plan
 
 if TYPE_CHECKING:
     from wayfuse.maps.importers.report import ImportReport
     from wayfuse.maps.site import Site
 
 __all__ = ["site"]
-
-# name of a building format -> module of its importer: import_site(path) -> (site, report)
-IMPORTERS = {
-    "ipin2023": "wayfuse.maps.importers.ipin2023",
-    "ms-indoor": "wayfuse.maps.importers.ms_indoor",
-    "hcu": "wayfuse.maps.importers.hcu",
-    "image": "wayfuse.maps.importers.image",
-    "imdf": "wayfuse.maps.importers.imdf",
-    "osm": "wayfuse.maps.importers.osm",
-    "simpleloc": "wayfuse.maps.importers.simpleloc",
-}
 
 
 @click.group(context_settings={"help_option_names": ["-h", "--help"]})
@@ -62,12 +52,10 @@ def import_command(plan_format: str, path: Path, out: Path, overwrite: bool, as_
 
     FORMAT simpleloc: PATH is the building.xml of a simpleLoc data set.
     """
-    import importlib
-
     from wayfuse.maps.store import check_target
 
     check_target(out, overwrite)
-    built, report = importlib.import_module(IMPORTERS[plan_format]).import_site(path)
+    built, report = import_plan(plan_format, path)
     built.save(out, overwrite=overwrite)
     _render(built, report, out, as_json)
 
@@ -118,30 +106,10 @@ def _make_folder(folder: Path) -> None:
         ) from error
 
 
-def _rows(built: Site, report: ImportReport) -> list[dict[str, Any]]:
-    return [
-        {
-            "floor": floor.name,
-            "level": floor.level,
-            "width_m": round(floor.width, 2),
-            "height_m": round(floor.height, 2),
-            "elevation_m": floor.elevation,
-            "units": len(floor.units),
-            "walls": len(floor.walls),
-            "doors": len(floor.doors),
-            "connectors": sum(k in connector.floors for connector in built.connectors),
-            "walkable_share": round(floor.walkable_share, 4),
-            "anchor_residual_m": None if note.residual is None else round(note.residual, 4),
-            "warnings": list(note.warnings),
-        }
-        for k, (floor, note) in enumerate(zip(built.floors, report.floors, strict=True))
-    ]
-
-
 def _render(built: Site, report: ImportReport, out: Path, as_json: bool) -> None:
     import json
 
-    rows = _rows(built, report)
+    rows = floor_rows(built, report)
     if as_json:
         document = {"site": built.name, "path": str(out), "floors": rows, "warnings": list(report.warnings)}
         click.echo(json.dumps(document, indent=1, ensure_ascii=False))
