@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -108,7 +108,7 @@ def _write_world(out: Path, world: World, text: str) -> None:
         write_access_points(out / "access_points_later.csv", world, world.later)
 
 
-def _summary(name: str, out: Path, world: World, done: Sequence[WalkFiles], seed: int) -> dict[str, object]:
+def _summary(name: str, out: Path, world: World, done: Sequence[WalkFiles], seed: int) -> dict[str, Any]:
     from wayfuse import __version__
 
     count = {role: sum(one.role == role for one in done) for role in ("survey", "walk")}
@@ -126,10 +126,24 @@ def _summary(name: str, out: Path, world: World, done: Sequence[WalkFiles], seed
         "radio_model": world.scenario.radio.model,
         "formats": list(world.scenario.output.formats),
         "files": sum(1 for path in out.rglob("*") if path.is_file()),
+        "commands": _commands(out, world),
     }
 
 
-def _text(document: dict[str, object], picture: bool) -> str:
+def _commands(out: Path, world: World) -> list[str]:
+    """What to run on the files next."""
+    survey, places = f"wayfuse survey build {out}/SITE {out}/survey --out {out}/map.npz", ""
+    track = f"wayfuse track {out}/SITE {out}/walks --radio-map {out}/map.npz"
+    if world.scenario.ranges.period_s or world.scenario.csi.period_s:
+        places = f" --access-points {out}/access_points.csv"
+    commands = [survey]
+    if world.scenario.csi.period_s:
+        commands.append(f"wayfuse survey channel {out}/SITE {out}/survey{places} --out {out}/channel.npz")
+        places += f" --channel-model {out}/channel.npz"
+    return [*commands, f"{track}{places} --out {out}/est.csv", f"wayfuse evaluate {out}/est.csv {out}/truth"]
+
+
+def _text(document: dict[str, Any], picture: bool) -> str:
     out = document["out"]
     walks = f"{document['survey_walks']} survey walks, {document['walks']} walks to track"
     aps = f"{document['access_points']} access points in {document['site']}"
@@ -137,8 +151,6 @@ def _text(document: dict[str, object], picture: bool) -> str:
         f"{document['scenario']}, seed {document['seed']}: {walks}, {aps}",
         f"written to {out}" + (f"; picture {Path(str(out)) / 'floors.png'}" if picture else ""),
         "",
-        f"wayfuse survey build {out}/SITE {out}/survey --out {out}/map.npz",
-        f"wayfuse track {out}/SITE {out}/walks --radio-map {out}/map.npz --out {out}/est.csv",
-        f"wayfuse evaluate {out}/est.csv {out}/truth",
+        *document["commands"],
     ]
     return "\n".join(lines)

@@ -1,4 +1,4 @@
-"""``wayfuse survey``: radio maps from recordings with waypoints, and the places of access points from a radio map."""
+"""``wayfuse survey``: radio maps from recordings with waypoints, the places of access points from a radio map."""
 
 from __future__ import annotations
 
@@ -6,6 +6,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
+
+from wayfuse.cli.survey_channel import channel_command
 
 if TYPE_CHECKING:
     from wayfuse.maps.site import Site
@@ -18,7 +20,10 @@ __all__ = ["survey"]
 
 @click.group(context_settings={"help_option_names": ["-h", "--help"]})
 def survey() -> None:
-    """Build radio maps from recordings with waypoints, and place access points."""
+    """Build radio maps from recordings with waypoints, place access points, fit channel state to distances."""
+
+
+survey.add_command(channel_command)
 
 
 @survey.command("build")

@@ -33,6 +33,12 @@ __all__ = ["track"]
     "estimated from the radio map.",
 )
 @click.option(
+    "--channel-model",
+    type=click.Path(path_type=Path),
+    help="From `wayfuse survey channel`: makes ranges of channel state, for li2015, fused-ranges, and fused with "
+    "--access-points.",
+)
+@click.option(
     "--method",
     "methods",
     multiple=True,
@@ -50,7 +56,7 @@ __all__ = ["track"]
 )
 @click.option(
     "--start",
-    help="For fused-no-wifi, pdr, li2015 and he2014: X,Y,FLOOR, or `waypoint` for each recording's first.",
+    help="For fused-no-wifi, pdr and the published systems: X,Y,FLOOR, or `waypoint` for each recording's first.",
 )
 @click.option("--jobs", type=click.IntRange(1), help="Processes (default: all cores).")
 @click.option("--out", type=click.Path(path_type=Path), required=True, help="EST.csv to write.")
@@ -59,6 +65,7 @@ def track(
     recordings: tuple[str, ...],
     radio_map: Path | None,
     access_points: Path | None,
+    channel_model: Path | None,
     methods: tuple[str, ...],
     seed: int,
     lag: float,
@@ -76,7 +83,7 @@ def track(
     the floor's plan), floor, lat, lon, and more. With --lag L a row's position uses records up to t_ms + L seconds.
     """
     from wayfuse import __version__
-    from wayfuse.cli.track_work import Worker
+    from wayfuse.cli.track_work import Given, Worker
     from wayfuse.cli.work import check_target, map_recordings, report_faults
     from wayfuse.core.jit import load_compiler
     from wayfuse.evaluation.estimates_file import Sidecar, open_writer
@@ -87,13 +94,15 @@ def track(
     methods = tuple(dict.fromkeys(methods))
     paths = list({path.resolve(): path for path in expand(recordings)}.values())
     _check_names(paths)
-    worker = Worker(site_folder, radio_map, access_points, methods, seed, lag, particles, start)
+    given = Given(site_folder, radio_map, access_points, channel_model)
+    worker = Worker(given, methods, seed, lag, particles, start)
     worker.prepare()  # errors of use appear here, once, before any process starts
     parameters: dict[str, Any] = {
         "methods": list(methods),
         "particles": particles or "each method's own",
         "start": start or "",
         "access_points": str(access_points.resolve()) if access_points else "",
+        "channel_model": str(channel_model.resolve()) if channel_model else "",
     }
     sidecar = Sidecar(
         site=str(site_folder.resolve()),

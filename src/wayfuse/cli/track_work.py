@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from wayfuse.presets.catalogue import METHODS, NEEDS, PAPERS
 
@@ -14,13 +14,14 @@ if TYPE_CHECKING:
     from wayfuse.maps.site import Site
     from wayfuse.models.observation.coverage import SurveyDistance
     from wayfuse.radio.ap_places import ApPlaces
+    from wayfuse.radio.channel_ranging import ChannelRanging
     from wayfuse.radio.survey import Survey
     from wayfuse.radio.walk_survey import WalkRadioMap
     from wayfuse.sensors.quality import Verdict
     from wayfuse.sensors.recording import Recording
     from wayfuse.tracking.dead_reckoning import Start
 
-__all__ = ["Result", "Worker"]
+__all__ = ["Given", "Result", "Worker"]
 
 
 def _check_made_for(made: WalkRadioMap, site: Site, path: Path) -> None:
@@ -57,7 +58,17 @@ class _Loaded:
 
         self.site, self.survey, self.places = site, survey, places
         self.distance: SurveyDistance | None = None if survey is None else SurveyDistance.build(survey)
+        self.channel: ChannelRanging | None = None
         self.trackers: dict[str, Any] = {}
+
+
+class Given(NamedTuple):
+    """Files of the command line: folder of the site, and what belongs to it."""
+
+    site: Path
+    radio_map: Path | None
+    access_points: Path | None
+    channel_model: Path | None
 
 
 class Worker:
@@ -65,16 +76,14 @@ class Worker:
 
     def __init__(
         self,
-        site: Path,
-        radio_map: Path | None,
-        access_points: Path | None,
+        given: Given,
         methods: tuple[str, ...],
         seed: int,
         lag: float,
         particles: int | None,
         start: str | None,
     ) -> None:
-        self.paths = site, radio_map, access_points
+        self.given = given
         self.methods, self.seed, self.lag, self.particles, self.start = methods, seed, lag, particles, start
         self.loaded: _Loaded | None = None
 
@@ -92,11 +101,12 @@ class Worker:
         if self.loaded is None:
             from wayfuse.maps.site import Site
 
-            site = Site.load(self.paths[0])
+            site = Site.load(self.given.site)
             self._check_needs()
             start = _check_start(self.start, site) if self.start is not None or self._need("start") else None
-            survey = None if self.paths[1] is None else _survey(site, self.paths[1])
-            loaded = _Loaded(site, survey, _places(site, self.paths[2]))
+            survey = None if self.given.radio_map is None else _survey(site, self.given.radio_map)
+            loaded = _Loaded(site, survey, _places(site, self.given.access_points))
+            loaded.channel = _channel(site, self.given.channel_model)
             loaded.trackers = {
                 name: self._build(loaded, name, start)
                 for name in self.methods
@@ -112,7 +122,7 @@ class Worker:
         """Say which option is missing before anything is loaded."""
         from wayfuse.core.errors import UsageError
 
-        has_map, has_places = self.paths[1] is not None, self.paths[2] is not None
+        has_map, has_places = self.given.radio_map is not None, self.given.access_points is not None
         for name in self._need("survey"):
             if not has_map:
                 raise UsageError(
@@ -131,6 +141,8 @@ class Worker:
                 )
 
     def _build(self, loaded: _Loaded, name: str, start: Start | None) -> Any:
+        from dataclasses import replace
+
         from wayfuse.presets.methods import begun_at, build_from_start, build_method
 
         if "start" in METHODS[name].needs:
@@ -140,6 +152,7 @@ class Worker:
         tracker = build_method(
             name, loaded.site, loaded.survey, places=loaded.places, n_particles=self.particles, lag=self.lag
         )
+        tracker = replace(tracker, channel=loaded.channel)
         return begun_at(tracker, start) if start is not None and METHODS[name].may_start else tracker
 
     def __call__(self, path: Path) -> Result:
@@ -163,7 +176,10 @@ class Worker:
         loaded = self.prepare()
         site = loaded.site
         result = Result(ok=True)
-        result.notes += [*recording.report.describe(), *_lacks(recording, self.methods)]
+        result.notes += [
+            *recording.report.describe(),
+            *_lacks(recording, self.methods, loaded.channel is not None),
+        ]
         for name in self.methods:
             tracker = loaded.trackers.get(name)
             if self.start == "waypoint" and METHODS[name].takes_start:
@@ -214,6 +230,23 @@ def _places(site: Site, path: Path | None) -> ApPlaces | None:
     return None if path is None else read_ap_places(path, site.floor_names)
 
 
+def _channel(site: Site, path: Path | None) -> ChannelRanging | None:
+    from wayfuse.core.errors import RadioMapError
+    from wayfuse.radio.channel_model import load_channel_model
+    from wayfuse.radio.channel_ranging import ChannelRanging
+
+    if path is None:
+        return None
+    model = load_channel_model(path)
+    if model.site != site.name:
+        raise RadioMapError(
+            f"channel model of site {model.site}, not of {site.name}",
+            where=path,
+            remedy="make one for this site",
+        )
+    return ChannelRanging(model=model)
+
+
 def _check_start(start: str | None, site: Site) -> Any:
     """A start of the command line: ``waypoint`` gives None."""
     from math import isfinite
@@ -241,7 +274,7 @@ def _check_start(start: str | None, site: Site) -> Any:
 _KINDS = {"scans": "Wi-Fi scan", "ranges": "range", "pressure": "pressure"}
 
 
-def _lacks(recording: Recording, methods: tuple[str, ...]) -> list[str]:
+def _lacks(recording: Recording, methods: tuple[str, ...], channel: bool) -> list[str]:
     """What a recording lacks for a method, and what it has that a published system makes nothing of, a line each."""
     from dataclasses import replace
 
@@ -250,7 +283,7 @@ def _lacks(recording: Recording, methods: tuple[str, ...]) -> list[str]:
         return [f"{where}: empty: no estimate"]
     has = {
         "scans": bool(recording.wifi),
-        "ranges": bool(recording.ranges),
+        "ranges": bool(recording.ranges) or (bool(recording.csi) and channel),
         "pressure": len(recording.pressure) > 0,
         "steps": bool(recording.steps) or len(recording.acceleration) > 0,
     }
@@ -259,7 +292,8 @@ def _lacks(recording: Recording, methods: tuple[str, ...]) -> list[str]:
         out.append(f"{where}: no Wi-Fi scan: the position stays unknown (state initialising)")
     for name in methods:
         if "ranges" in METHODS[name].hears and not has["ranges"]:
-            out.append(f"{where}: no range to an anchor: {name} knows no position (state initialising)")
+            hint = "; channel state needs --channel-model" if recording.csi and not channel else ""
+            out.append(f"{where}: no range to an anchor: {name} knows no position (state initialising){hint}")
         unused = [kind for key, kind in _KINDS.items() if has[key] and key not in METHODS[name].hears]
         if unused and name in PAPERS:
             out.append(f"{where}: {name} does not use: {', '.join(unused)}")
