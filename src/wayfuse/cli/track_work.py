@@ -231,20 +231,10 @@ def _places(site: Site, path: Path | None) -> ApPlaces | None:
 
 
 def _channel(site: Site, path: Path | None) -> ChannelRanging | None:
-    from wayfuse.core.errors import RadioMapError
     from wayfuse.radio.channel_model import load_channel_model
     from wayfuse.radio.channel_ranging import ChannelRanging
 
-    if path is None:
-        return None
-    model = load_channel_model(path)
-    if model.site != site.name:
-        raise RadioMapError(
-            f"channel model of site {model.site}, not of {site.name}",
-            where=path,
-            remedy="make one for this site",
-        )
-    return ChannelRanging(model=model)
+    return None if path is None else ChannelRanging(model=load_channel_model(path, site.name))
 
 
 def _check_start(start: str | None, site: Site) -> Any:

@@ -62,8 +62,8 @@ def fit_channel_model(frames: Sequence[CsiFrame], distances: Array, site: str = 
     return ChannelModel(fit_anchors(frames, distances, subcarriers), subcarriers, site)
 
 
-def load_channel_model(path: str | PathLike[str]) -> ChannelModel:
-    """Read a channel model; RadioMapError on a damaged, foreign or newer file."""
+def load_channel_model(path: str | PathLike[str], of: str = "") -> ChannelModel:
+    """Read a channel model; RadioMapError on a damaged, foreign or newer file, or one not of the site ``of``."""
     _, header, arrays = read_archive(path, _KIND, version=_VERSION)
     try:
         ids, table, subcarriers = arrays["anchor"], arrays["regressions"], arrays["subcarriers"]
@@ -76,6 +76,10 @@ def load_channel_model(path: str | PathLike[str]) -> ChannelModel:
             where=path,
             remedy="make it again: `wayfuse survey channel`",
         ) from fault
+    if of and site != of:
+        raise RadioMapError(
+            f"channel model of site {site}, not of {of}", where=path, remedy="make one with this site"
+        )
     anchors = {
         int(anchor): tuple(
             RangeRegression(*antenna) for antenna in row.tolist() if np.isfinite(antenna).all()

@@ -26,7 +26,7 @@ __all__ = ["INTEL5300_20MHZ", "direct_path_power", "fourier_order", "impulse_res
 
 # subcarriers of the 30 groups at 20 MHz (IEEE 802.11n, grouping 2)
 INTEL5300_20MHZ: IntArray = np.array([*range(-28, -1, 2), -1, *range(1, 28, 2), 28])
-_TRANSFORMS = (64, 128, 256)  # values of 20, 40 and 80 MHz
+_TRANSFORMS = (64, 128, 256, 512)  # values of 20, 40, 80 and 160 MHz
 _OVERSAMPLING = 4  # taps per 1 / bandwidth: between two of 1 / bandwidth a peak would lose up to 3.9 dB
 
 
