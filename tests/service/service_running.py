@@ -8,7 +8,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -61,9 +61,14 @@ def wait_until(is_so: Any, seconds: float = 60.0) -> None:
 
 @contextmanager
 def running(
-    folder: Path, data: Path, *options: object, token: str = "", **settings: object
+    folder: Path,
+    data: Path,
+    *options: object,
+    token: str = "",
+    sites: Sequence[Path] | None = None,
+    **settings: object,
 ) -> Iterator[Running]:
-    """A server of the small world in ``folder``; ends with the block."""
+    """A server of the small world in ``folder``, or of other sites; ends with the block."""
     environment = {k: v for k, v in os.environ.items() if not k.startswith("WAYFUSE_SERVER_")}
     environment |= {f"WAYFUSE_SERVER_{k.upper()}": str(v) for k, v in settings.items()}
     command = [
@@ -71,7 +76,7 @@ def running(
         "-m",
         "wayfuse",
         "serve",
-        folder / "SITE",
+        *([folder / "SITE"] if sites is None else sites),
         "--port",
         0,
         "--data",
@@ -152,10 +157,17 @@ class App:
 
 
 @contextmanager
-def started(world: Any, data: Path, radio_map: str | None = "map.npz", **settings: Any) -> Iterator[App]:
-    """A server of the small world in this process."""
+def started(
+    world: Any,
+    data: Path,
+    radio_map: str | None = "map.npz",
+    sites: Sequence[SiteFiles] | None = None,
+    **settings: Any,
+) -> Iterator[App]:
+    """A server of the small world, or of other sites, in this process."""
     values = {"particles": 100, "rate_per_s": 0.0} | settings
-    files = SiteFiles(world.folder / "SITE", world.folder / radio_map if radio_map else None)
-    server = Server(Settings(data=str(data), **values), [files], clock=time.time, random=secrets.token_bytes)
+    if sites is None:
+        sites = [SiteFiles(world.folder / "SITE", world.folder / radio_map if radio_map else None)]
+    server = Server(Settings(data=str(data), **values), sites, clock=time.time, random=secrets.token_bytes)
     with TestClient(create_app(server), raise_server_exceptions=False) as client:
         yield App(server, client)

@@ -138,6 +138,10 @@ class Looked:
         self.page.goto(f"{self.address}/")
         self.page.fill("#token", token)
         self.page.click("text=Show the map")
+        self.wait()
+
+    def wait(self) -> None:
+        """Until the page shows a building and is connected."""
         self.page.wait_for_selector("#floors button")
         self.page.wait_for_selector("#connection[data-state=on]")
 
@@ -186,14 +190,14 @@ def look(browser: Any, served: Running) -> Iterator[Callable[..., Looked]]:
     """Open the page (options: those of a browser's context); afterwards nothing may have been wrong with it."""
     opened: list[Looked] = []
 
-    def open_page(**options: Any) -> Looked:
+    def open_page(address: str = served.address, **options: Any) -> Looked:
         context = browser.new_context(**{"viewport": {"width": 1280, "height": 800}} | options)
-        looked = Looked(context.new_page(), served.address)
+        looked = Looked(context.new_page(), address)
         looked.page.on(
             "console", lambda m: m.type in {"error", "warning"} and looked.complaints.append(m.text)
         )
         looked.page.on("pageerror", lambda e: looked.complaints.append(str(e)))
-        own = (served.address, "data:", f"blob:{served.address}")
+        own = (address, "data:", f"blob:{address}")
         context.on("request", lambda r: r.url.startswith(own) or looked.outside.append(r.url))
         opened.append(looked)
         return looked

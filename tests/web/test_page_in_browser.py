@@ -5,9 +5,11 @@ from __future__ import annotations
 import json
 import time
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import pytest
+from service_running import running
 
 pytestmark = pytest.mark.slow  # a browser that draws without a GPU takes seconds to start and to draw
 
@@ -300,3 +302,23 @@ def test_zones_are_drawn_with_who_is_inside(
     page.page.locator("#view-zones .zones .who").filter(has_text=phone.track[:6]).first.click()
     page.page.click("#tab-tracks")
     assert page.page.inner_text(".detail .state").startswith(phone.track[:6])
+
+
+def test_a_building_is_imported_where_there_was_none(
+    look: Callable[..., Any], house: Any, tmp_path: Path
+) -> None:
+    with running(house.folder, tmp_path / "data", sites=[]) as server:
+        page = look(server.address)
+        page.page.goto(f"{server.address}/")
+        page.page.fill("#token", server.token)
+        page.page.click("text=Show the map")
+        page.until(lambda: "no building yet" in page.page.inner_text("#notice"))
+        page.page.set_input_files("#plan-file", house.folder / "plan.imdf.zip")
+        page.page.fill("#plan-name", "Annexe")
+        page.page.get_by_role("button", name="Import", exact=True).click()
+        page.wait()
+        page.until(lambda: not page.page.is_visible("#notice"))
+        page.until(lambda: "Annexe: 3 floors." in page.page.inner_text("#view-survey"))
+        page.page.check("[value=coverage]")
+        page.until(lambda: "0 fingerprints" in page.page.inner_text("#view-survey"))
+        page.page.goto("about:blank")

@@ -10,7 +10,7 @@ __all__ = ["serve"]
 
 
 @click.command(context_settings={"help_option_names": ["-h", "--help"]})
-@click.argument("site_folders", metavar="SITE...", nargs=-1, required=True, type=click.Path(path_type=Path))
+@click.argument("site_folders", metavar="[SITE]...", nargs=-1, type=click.Path(path_type=Path))
 @click.option(
     "--radio-map",
     "radio_maps",
@@ -36,7 +36,7 @@ def serve(
     database: str | None,
     new_admin_token: bool,
 ) -> None:
-    """Serve live positions in SITE... over HTTP.
+    """Serve live positions in SITE... over HTTP; without a SITE, in those that were imported over the page.
 
     Phones post their records, tracks come out as GeoJSON, as a stream of events, and on the page at `/`. At the first
     start an administrator's token is printed, once; it makes the tokens of phones and readers.
@@ -69,4 +69,7 @@ def serve(
         if server.published(name) is None:
             note = f"note: site {name} has no radio map yet; its phones are refused until one is published"
             click.echo(note, err=True)
-    run(server, lambda address: click.echo(f"serving {', '.join(server.worlds)} at {address}"))
+    run(
+        server,
+        lambda address: click.echo(f"serving {', '.join(server.worlds) or 'no site yet'} at {address}"),
+    )

@@ -19,6 +19,7 @@ from wayfuse.service.routes import (
     inputs,
     outputs,
     pages,
+    sites,
     stream,
     web_assets,
     web_particles,
@@ -71,7 +72,7 @@ def create_app(server: Server) -> FastAPI:
     )
     app.state.server, app.state.surveys = server, surveys
     web = (zones, web_plan, web_particles, web_radio, web_survey, web_assets)
-    for part in (inputs, outputs, stream, admin, pages, *web):
+    for part in (inputs, outputs, stream, sites, admin, pages, *web):
         app.include_router(part.router)
     handle_problems(app)
     app.add_middleware(SecurityHeaders)

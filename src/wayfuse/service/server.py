@@ -28,6 +28,7 @@ from wayfuse.service.pipeline import BusyError, Pipeline, PipelineConfig, recove
 from wayfuse.service.positions import Json, feature, told
 from wayfuse.service.security import Authority
 from wayfuse.service.settings import Settings
+from wayfuse.service.uploaded_sites import UploadedSites
 from wayfuse.service.world import World, survey_of
 from wayfuse.service.zones import Zone, read_geofences
 from wayfuse.storage.audit import AuditLog
@@ -94,11 +95,17 @@ class Server:
         self.authority = Authority(
             self.tokens, RateLimit(settings.rate_per_s, settings.rate_burst, clock), clock
         )
-        plans = {site.name: site for site in map(Site.load, (files.folder for files in sites))}
+        self.uploads = UploadedSites(data / "sites")
+        given = [(Site.load(files.folder), files.radio_map) for files in sites]
+        plans = {site.name: site for site in map(Site.load, self.uploads.folders())}
+        plans |= {site.name: site for site, _ in given}  # the operator's own files go first
         self._fences: dict[str, list[Zone]] = (
             read_geofences(Path(settings.geofences), plans) if settings.geofences else {}
         )
-        self.worlds |= {world.site.name: world for world in [self._world(files) for files in sites]}
+        maps = {site.name: radio_map for site, radio_map in given}
+        self.given = frozenset(maps)  # sites of the command line: they are changed there
+        for site in plans.values():
+            self.worlds[site.name] = self.world_of(site, maps.get(site.name))
         config = LiveConfig(rewind=settings.rewind_s, spacing=settings.spacing_s)
         self.live = Live(self.worlds, self.tracks.state, config, settings.seed)
         self.hub = Hub(settings.events)
@@ -107,13 +114,17 @@ class Server:
         self.pipeline: Pipeline | None = None
         self._watch()
 
-    def _world(self, files: SiteFiles) -> World:
-        site = Site.load(files.folder)
+    def world_of(self, site: Site, radio_map: Path | None = None) -> World:
+        """A site with all that tracking needs; a radio map is kept and published.
+
+        Raises
+        ------
+        RadioMapError : the radio map, or the one in use, is not of this site.
+        """
         digest = sha256(json.dumps(dict(site.provenance), sort_keys=True).encode()).hexdigest()
         self.sites.register(site.name, digest, self.clock())
-        if files.radio_map is not None:
-            archive = files.radio_map.read_bytes()
-            version = self.add_radio_map(site, archive, _OPERATOR, files.radio_map.name)
+        if radio_map is not None:
+            version = self.add_radio_map(site, radio_map.read_bytes(), _OPERATOR, radio_map.name)
             if self.published(site.name) != version:
                 self.publish(site.name, version, _OPERATOR)
         world = World(

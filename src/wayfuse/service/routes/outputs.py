@@ -54,7 +54,7 @@ def sites(request: Request, token: Reader) -> dict[str, Any]:
                 "radio_map": server.published(name),
                 "tracks": len(server.live.views(name)),
             }
-            for name, world in server.worlds.items()
+            for name, world in list(server.worlds.items())
             if token.site in {"", name}
         ]
     }

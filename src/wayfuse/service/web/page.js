@@ -56,7 +56,14 @@ function startSites(sites) {
   select.replaceChildren(...sites.map((s) => el("option", { value: s.name, textContent: s.name })));
   select.hidden = sites.length < 2;
   document.querySelector("label.site").hidden = sites.length < 2;
-  select.addEventListener("change", () => open(select.value).catch((error) => notice(error.message)));
+  select.onchange = () => open(select.value).catch((error) => notice(error.message));
+}
+
+/** Go to a building that was not there before. */
+async function imported(name) {
+  startSites((await get("/api/v1/sites")).sites);
+  byId("site").value = name;
+  await open(name);
 }
 
 async function start() {
@@ -66,7 +73,7 @@ async function start() {
   startDrawing(map);
   startFloors(byId("floors"));
   const replay = startReplay(byId("view-replay"), map);
-  const survey = startSurvey(byId("view-survey"), map);
+  const survey = startSurvey(byId("view-survey"), map, imported);
   startTracks(byId("view-tracks"), map, (track) => {
     byId("tab-replay").click();
     return replay.replay(track);
@@ -86,7 +93,10 @@ async function start() {
   byId("leave").hidden = false;
   startSites(sites);
   if (sites.length) await open(sites[0].name);
-  else notice("This server has no site that the token may see.");
+  else {
+    notice("There is no building yet that this token may see. An administrator imports one under Survey.");
+    byId("tab-survey").click();
+  }
 }
 
 start().catch((error) => notice(error.message));

@@ -6,10 +6,12 @@ import { collection, feature } from "/web/frames.js";
 import { store } from "/web/store.js";
 import { startPictures } from "/web/survey_pictures.js";
 import { startRecord } from "/web/survey_record.js";
+import { startImport } from "/web/survey_site.js";
 
 const ASK_MS = 1000;
 
-export function startSurvey(view, map) {
+/** imported(name): a building was imported. */
+export function startSurvey(view, map, imported) {
   const said = el("p", { className: "small", role: "status" });
   let last = null;
   let open = false;
@@ -27,6 +29,7 @@ export function startSurvey(view, map) {
     map.data("points", collection([...lines, ...spots]));
   };
   const ask = async () => {
+    if (!store.site) return;
     last = await get("/api/v1/survey", { site: store.site });
     record.take(last);
     parts.take(last);
@@ -38,7 +41,8 @@ export function startSurvey(view, map) {
   const versions = startVersions(() => pictures.again());
   const builder = startBuilder(ask, versions.list);
   const pictures = startPictures(map);
-  view.append(said, pictures.element, record.element, parts.element, builder.element, versions.element);
+  const building = startImport(imported);
+  view.append(said, pictures.element, record.element, parts.element, builder.element, versions.element, building.element);
 
   const tried = async (work) => {
     try {
@@ -53,6 +57,10 @@ export function startSurvey(view, map) {
   store.on("site", () => open && opened());
   const opened = async () => {
     open = true;
+    if (!store.site) {
+      building.open();
+      return;
+    }
     await tried(ask);
     await tried(versions.list);
     await pictures.again();
