@@ -12,6 +12,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from wayfuse.formats._kernels import mark_repeats
+
 WITHOUT_NUMBA = "import sys; sys.modules['numba'] = None; from wayfuse.cli.main import main; main()"
 COMPILED = "from wayfuse.cli.main import main; main()"
 
@@ -66,3 +68,16 @@ print(index)
 def test_what_the_compiler_is_kept_from_can_be_loaded_afterwards() -> None:
     done = subprocess.run([sys.executable, "-c", AFTERWARDS], capture_output=True, text=True, check=False)
     assert done.stdout == "[1 2]\n", done.stderr[-3000:]
+
+
+def test_a_kernel_that_counts_no_references_leaves_those_of_its_arrays_alone() -> None:
+    t, ids, values = np.array([1.0, 2.0, 1.0]), np.array([5, 5, 5], np.uint64), np.zeros((3, 3))
+    table, repeat = np.full(8, -1), np.empty(3, np.bool_)
+    arrays = (t, ids, values, table, repeat)
+    before = [sys.getrefcount(a) for a in arrays]
+    with np.errstate(over="ignore"):
+        for _ in range(100):
+            table[:] = -1
+            mark_repeats(*arrays)
+    assert repeat.tolist() == [False, False, True]
+    assert [sys.getrefcount(a) for a in arrays] == before

@@ -16,7 +16,15 @@ from contextlib import contextmanager
 from importlib import import_module
 from typing import Any, TypeVar, cast
 
-__all__ = ["COMPILED", "bounded_kernel", "fast_kernel", "inline_kernel", "kernel", "load_compiler"]
+__all__ = [
+    "COMPILED",
+    "bounded_kernel",
+    "fast_kernel",
+    "inline_kernel",
+    "kernel",
+    "load_compiler",
+    "uncounted_kernel",
+]
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -72,6 +80,17 @@ def fast_kernel(function: F) -> F:
 def bounded_kernel(function: F) -> F:
     """Compile a kernel whose arrays hold neither NaN nor infinity, as its caller sees to: greatest values vectorise."""
     return _compiled(function, fastmath=True)
+
+
+def uncounted_kernel(function: F) -> F:
+    """Compile a kernel that makes no array of its own, only views of the caller's: references are not counted.
+
+    To count them takes two locked additions per call of a helper with an array, more than short helpers take.
+    """
+    known = COMPILED and hasattr(
+        _NUMBA.core.options.DefaultOptions, "_nrt"
+    )  # an option that numba does not document
+    return _compiled(function, fastmath=False, **({"_nrt": False} if known else {}))
 
 
 def inline_kernel(function: F) -> F:

@@ -17,7 +17,7 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from wayfuse.core.jit import inline_kernel, kernel
+from wayfuse.core.jit import inline_kernel, uncounted_kernel
 from wayfuse.core.types import Array, BoolArray, IdArray, IntArray
 
 __all__ = ["KINDS", "mark_repeats", "scan_ms_indoor"]
@@ -53,13 +53,14 @@ _WORDS = np.array(
 )
 
 _U = np.uint64
+_ONE, _TEN, _MANY = _U(1), _U(10), _U(18)  # more than 18 digits are never exact
 _LOW7, _HIGH, _ONES = _U(0x7F7F7F7F7F7F7F7F), _U(0x8080808080808080), _U(0x0101010101010101)
 _TABS, _NEWLINES = _U(0x0909090909090909), _U(0x0A0A0A0A0A0A0A0A)
 _YS = _U(0x5959595959595959)
 _FIVE, _TYPE = _U(0xFFFFFFFFFF), _U(int.from_bytes(b"TYPE_", "little"))
 _NIBBLES, _THREES, _SIXES = _U(0xF0F0F0F0F0F0F0F0), _U(0x3333333333333333), _U(0x0606060606060606)
 
-_EXACT = 1 << 53  # integers up to here are float64
+_EXACT = _U(1 << 53)  # integers up to here are float64
 _POWERS = 10.0 ** np.arange(23)  # all exact in float64
 _HEX = np.full(256, 255, np.uint8)
 for _digit in range(16):
@@ -105,7 +106,7 @@ def _digits13(word: IdArray, i: int) -> Any:
     return value
 
 
-@kernel
+@uncounted_kernel
 def _kind_at(word: IdArray, i: int) -> int:
     """Row of `KINDS` whose name stands at i, a tab behind it; -1 for any other."""
     head = word[i]
@@ -126,50 +127,58 @@ def _kind_at(word: IdArray, i: int) -> int:
     return kind
 
 
-@kernel
-def _decimal(buf: Bytes, i: int) -> tuple[float, int]:
-    """Number at i and the place behind it; place -1 where it is not plain or not exact in one operation."""
+@uncounted_kernel
+def _decimal(buf: Bytes, start: int) -> tuple[float, Any]:
+    """Number at ``start`` and the place behind it; place -1 where it is not plain or not exact in one operation.
+
+    Places are unsigned inside: for others the compiler asks of each whether it counts from the end.
+    """
+    i = _U(start)
     negative = buf[i] == _MINUS
     if negative:
-        i += 1
+        i += _ONE
     first = i
-    mantissa = np.int64(0)
-    while _ZERO <= buf[i] <= _NINE:
-        mantissa = mantissa * 10 + np.int64(buf[i] - _ZERO)
-        i += 1
+    mantissa = _U(0)
+    digit = _U(buf[i]) - _U(_ZERO)
+    while digit < _TEN:
+        mantissa = mantissa * _TEN + digit
+        i += _ONE
+        digit = _U(buf[i]) - _U(_ZERO)
     digits = i - first
-    power = 0
-    if digits and buf[i] == _DOT:
-        i += 1
+    power = np.int64(0)
+    if digits > _U(0) and buf[i] == _DOT:
+        i += _ONE
         first = i
-        while _ZERO <= buf[i] <= _NINE:
-            mantissa = mantissa * 10 + np.int64(buf[i] - _ZERO)
-            i += 1
-        power = first - i
-        digits = digits - power if power else 0
-    if digits == 0 or digits > 18 or mantissa > _EXACT:
+        digit = _U(buf[i]) - _U(_ZERO)
+        while digit < _TEN:
+            mantissa = mantissa * _TEN + digit
+            i += _ONE
+            digit = _U(buf[i]) - _U(_ZERO)
+        power = -np.int64(i - first)
+        digits = digits + (i - first) if power != 0 else _U(0)
+    if digits == _U(0) or digits > _MANY or mantissa > _EXACT:
         return 0.0, -1
     if buf[i] == _E:
-        i += 1
+        i += _ONE
         down = buf[i] == _MINUS
         if down:
-            i += 1
+            i += _ONE
         first = i
-        exponent = 0
-        while _ZERO <= buf[i] <= _NINE and i - first < 4:
-            exponent = exponent * 10 + int(buf[i] - _ZERO)
-            i += 1
+        exponent = np.int64(0)
+        while _ZERO <= buf[i] <= _NINE and i - first < _U(4):
+            exponent = exponent * 10 + np.int64(buf[i] - _ZERO)
+            i += _ONE
         if i == first:
             return 0.0, -1
         power += -exponent if down else exponent
     if power < -22 or power > 22:
         return 0.0, -1
-    value = np.float64(mantissa)
+    value = np.float64(np.int64(mantissa))
     value = value / _POWERS[-power] if power < 0 else value * _POWERS[power]
-    return (-value if negative else value), i
+    return (-value if negative else value), np.int64(i)
 
 
-@kernel
+@uncounted_kernel
 def _address(buf: Bytes, i: int) -> Any:
     """48-bit hardware address ``hh:hh:hh:hh:hh:hh`` at i; the top bit set where there is none."""
     value, bad = _U(0), False
@@ -189,7 +198,7 @@ def _field_start(buf: Bytes, stop: int) -> int:
     return i
 
 
-@kernel
+@uncounted_kernel
 def _motion(buf: Bytes, i: int, out: Array) -> int:
     """Three numbers and an accuracy from i; the place of the line end, -1 where the line is otherwise."""
     for k in range(3):
@@ -205,7 +214,7 @@ def _motion(buf: Bytes, i: int, out: Array) -> int:
     return -1
 
 
-@kernel
+@uncounted_kernel
 def _radio(buf: Bytes, word: IdArray, kind: int, stop: int, n_tabs: int, out: Array) -> tuple[int, int]:
     """Fields of a radio record, read from its end; start and stop of the identifier, -1 where one is amiss.
 
@@ -245,7 +254,26 @@ def _radio(buf: Bytes, word: IdArray, kind: int, stop: int, n_tabs: int, out: Ar
     return start, stop
 
 
-@kernel
+@uncounted_kernel
+def _rest(word: IdArray, start: int) -> tuple[int, int, bool]:
+    """Place of the line end from ``start`` on, the tabs before it, and whether there is a Y before it."""
+    i = _U(start)
+    n_tabs, letters = np.int64(0), _U(0)
+    w = word[i]
+    ends = _equal_bytes(w, _NEWLINES)
+    while ends == _U(0):
+        n_tabs += _n_bytes(_equal_bytes(w, _TABS))
+        letters |= _equal_bytes(w, _YS)
+        i += _U(8)
+        w = word[i]
+        ends = _equal_bytes(w, _NEWLINES)
+    below = ~ends & (ends - _ONE)
+    n_tabs += _n_bytes(_equal_bytes(w, _TABS) & below)
+    letters |= _equal_bytes(w, _YS) & below
+    return np.int64(i) + _n_bytes(below & _HIGH), n_tabs, letters != _U(0)
+
+
+@uncounted_kernel
 def scan_ms_indoor(
     buf: Bytes,
     word: IdArray,
@@ -285,24 +313,10 @@ def scan_ms_indoor(
         if not good:
             if kind >= 0:
                 i += 13 + _LENGTH[kind]  # on the tab before the fields
-            n_tabs = 0
-            n_letters = 0
-            while True:
-                w = word[i]
-                ends, marks = _equal_bytes(w, _NEWLINES), _equal_bytes(w, _TABS)
-                letters = _equal_bytes(w, _YS)
-                if ends:
-                    below = (ends & (~ends + _U(1))) - _U(1)
-                    n_tabs += _n_bytes(marks & below)
-                    n_letters += _n_bytes(letters & below)
-                    i += _n_bytes(below & _HIGH)
-                    break
-                n_tabs += _n_bytes(marks)
-                n_letters += _n_bytes(letters)
-                i += 8
+            i, n_tabs, has_y = _rest(word, i)
             if kind >= _UNCALIBRATED:
-                good = n_tabs == (3 if kind == _BLU4 else 7) and n_letters == 0
-            elif kind >= _WIFI and (kind == _WIFI or n_letters == 0):  # a name may hold Y, and TYPE_ does
+                good = n_tabs == (3 if kind == _BLU4 else 7) and not has_y
+            elif kind >= _WIFI and (kind == _WIFI or not has_y):  # a name may hold Y, and TYPE_ does
                 row = counts[kind]
                 first, last = _radio(buf, word, kind, i, n_tabs, values[row, kind])
                 good = last > first and (word[first] & _FIVE) != _TYPE
@@ -327,7 +341,7 @@ def scan_ms_indoor(
     return number
 
 
-@kernel
+@uncounted_kernel
 def mark_repeats(t: Array, ids: IdArray, values: Array, table: IntArray, repeat: BoolArray) -> None:
     """Mark the readings that repeat an earlier one exactly (time, identifier, three values; NaN equals NaN).
 
