@@ -6,6 +6,7 @@ import re
 from collections.abc import Iterator
 from typing import Any
 
+import jsonschema_rs
 import pytest
 import schemathesis
 from hypothesis import HealthCheck, given, settings
@@ -13,6 +14,9 @@ from hypothesis.errors import Unsatisfiable
 from schemathesis import GenerationMode
 from schemathesis.specs.openapi.checks import ignored_auth, negative_data_rejection, positive_data_acceptance
 from service_running import App, Running, running
+
+from wayfuse.service.routes.bodies import BODIES
+from wayfuse.service.routes.examples import EXAMPLES
 
 # what a description cannot say: that a site exists, that taps are in order; unknown parameters are ignored, as the web
 # does; and who guesses tokens is soon told 429, not 401 (test_nothing_is_told_without_a_token)
@@ -65,6 +69,43 @@ def test_answers_are_as_described(served: Running) -> None:
 @pytest.mark.slow
 def test_many_answers_are_as_described(served: Running) -> None:
     assert not _failures(served, _MANY)
+
+
+def _whole(part: Any) -> Any:
+    """A body whose whole numbers are written as such: to JSON Schema 1.0 is an integer, to the server it is none."""
+    if isinstance(part, dict):
+        return {key: _whole(value) for key, value in part.items()}
+    if isinstance(part, list):
+        return [_whole(value) for value in part]
+    return int(part) if isinstance(part, float) and part.is_integer() else part
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("way", ["own", "sensor-logger", "find3", "anchors"])
+def test_a_body_that_is_as_described_can_be_read(served: Running, way: str) -> None:
+    schema = schemathesis.openapi.from_url(f"{served.address}/openapi.json")
+    drawn = schema[f"/api/v1/in/{way}"]["POST"].as_strategy(generation_mode=GenerationMode.POSITIVE)
+    said = []
+
+    @_MANY
+    @given(case=drawn)
+    def check(case: schemathesis.Case) -> None:
+        case.query = {"platform": "android", "standardised": False}
+        case.body = _whole(case.body)
+        answer = case.call(headers={"Authorization": f"Bearer {served.token}"})
+        said.append(answer.status_code)
+        assert answer.status_code == 200, answer.text
+
+    check()
+    assert len(said) >= 10
+
+
+@pytest.mark.parametrize("way", EXAMPLES)
+def test_the_examples_are_as_described(way: str) -> None:
+    jsonschema_rs.validate(BODIES[way], EXAMPLES[way])
+    if way != "getsensordata":
+        with pytest.raises(jsonschema_rs.ValidationError):
+            jsonschema_rs.validate(BODIES[way], {"payload": []})
 
 
 def test_nothing_is_told_without_a_token(app: App) -> None:

@@ -15,6 +15,7 @@ from wayfuse.service.ingest import ingest
 from wayfuse.service.limits import read_body
 from wayfuse.service.message import Profile, SayToUserError
 from wayfuse.service.problems import Problem, responses
+from wayfuse.service.routes.bodies import BODIES
 from wayfuse.service.routes.examples import EXAMPLES
 from wayfuse.service.security import bearer
 from wayfuse.service.wire import encode
@@ -61,13 +62,12 @@ class AcceptedBody(BaseModel):
 def _described(adapter: str) -> dict[str, Any]:
     media = _MEDIA.get(adapter, "application/json")
     example = {"example": EXAMPLES[adapter]}
-    schema = {"type": "string"} if media == "text/plain" else {"type": "object"}
     parameters = [
         {"name": name, "in": "query", "required": False, "schema": schema, "description": what}
         for name, (schema, what) in _PARAMETERS.items()
     ]
     return {
-        "requestBody": {"required": True, "content": {media: {"schema": schema, **example}}},
+        "requestBody": {"required": True, "content": {media: {"schema": BODIES[adapter], **example}}},
         "parameters": parameters,
         "security": [{SCHEME.scheme_name: []}],
     }

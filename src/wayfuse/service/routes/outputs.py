@@ -95,7 +95,11 @@ def track(request: Request, token: Reader, track: str) -> dict[str, Any]:
     return _summary(look.view.row, look.view, is_live=look.is_live)
 
 
-@router.get("/tracks/{track}/position", summary="Where somebody is", responses=responses(404))
+@router.get(
+    "/tracks/{track}/position",
+    summary="Where somebody is",
+    responses=responses(404) | {200: {"content": {"application/json": {"example": POSITION}}}},
+)
 def position(request: Request, token: Reader, track: str) -> dict[str, Any]:
     """GeoJSON of the latest position."""
     server = server_of(request)
