@@ -13,13 +13,10 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import NoReturn
 
-import pytest
+from programs import skip_without
 
 __all__ = ["create_database", "running_server"]
-
-REQUIRED = "WAYFUSE_REQUIRE_PROGRAMS"
 
 
 def _binaries() -> Path | None:
@@ -28,13 +25,6 @@ def _binaries() -> Path | None:
         return Path(found).resolve().parent
     versions = sorted(Path("/usr/lib/postgresql").glob("*/bin/initdb"))
     return versions[-1].parent if versions else None
-
-
-def _skip_loudly(why: str) -> NoReturn:
-    """Skip, or fail where the programs that tests need are said to be there."""
-    if os.environ.get(REQUIRED):
-        pytest.fail(f"PostgreSQL: {why}, and {REQUIRED} is set")
-    pytest.skip(f"POSTGRESQL NOT TESTED: {why}")
 
 
 def _account() -> pwd.struct_passwd | None:
@@ -46,7 +36,7 @@ def _account() -> pwd.struct_passwd | None:
             return pwd.getpwnam(name)
         except KeyError:
             continue
-    _skip_loudly("running as root, and no unprivileged user to start it as")
+    return skip_without("PostgreSQL", "running as root, and no unprivileged user to start it as")
 
 
 @contextmanager
@@ -54,7 +44,7 @@ def running_server() -> Iterator[str]:
     """URL of the server up to the name of the database; skips loudly where there is no PostgreSQL."""
     binaries = _binaries()
     if binaries is None:
-        _skip_loudly("no initdb on this machine")
+        skip_without("PostgreSQL", "no initdb on this machine")
     account = _account()
     user = {} if account is None else {"user": account.pw_uid, "group": account.pw_gid}
     folder = Path(tempfile.mkdtemp(prefix="wayfuse-postgres-"))

@@ -17,6 +17,7 @@ import aiomqtt
 import pytest
 from service_running import App, started, wait_until
 
+from programs import skip_without
 from wayfuse.core.errors import ConfigError
 from wayfuse.sensors.records import BleReading, Range, bssid_id
 from wayfuse.service.adapters import ADAPTERS
@@ -27,8 +28,6 @@ from wayfuse.service.mqtt_topics import Broker, broker_of, inbound, outbound
 from wayfuse.service.replay import envelopes
 from wayfuse.service.settings import Settings
 from wayfuse.service.wire import encode
-
-REQUIRED = "WAYFUSE_REQUIRE_PROGRAMS"  # as of the tests of the page: programs that a test may not do without
 
 
 class Mosquitto:
@@ -69,9 +68,7 @@ def broker(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Mosquitto]:
     """The broker of the tests of this file."""
     program = shutil.which("mosquitto", path=os.environ.get("PATH", "") + ":/usr/sbin")
     if program is None:
-        if os.environ.get(REQUIRED):
-            pytest.fail(f"no mosquitto, and {REQUIRED} is set")
-        pytest.skip("NO MQTT TEST: no mosquitto on this machine")
+        skip_without("mosquitto", "it is not on this machine")
     broker = Mosquitto(program, tmp_path_factory.mktemp("broker"))
     yield broker
     broker.stop()

@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import json
-import os
 import shutil
 import sys
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Any
 
 import pytest
 
+from programs import skip_without
 from wayfuse.maps.site import Site
 from wayfuse.sensors.recording import Recording
 from wayfuse.service.replay import envelopes
@@ -22,20 +22,12 @@ from wayfuse.service.wire import encode
 sys.path.append(str(Path(__file__).parent.parent / "service"))  # how a server is run is written there, once
 from service_running import Running, running, wait_until
 
-REQUIRED = "WAYFUSE_REQUIRE_PROGRAMS"
 _DRAWS_WITHOUT_A_GPU = (
     "--use-angle=swiftshader",
     "--enable-unsafe-swiftshader",
     "--ignore-gpu-blocklist",
     "--no-sandbox",
 )
-
-
-def skip_loudly(what: str) -> NoReturn:
-    """Skip; fail where the environment says that a browser is a must."""
-    if os.environ.get(REQUIRED):
-        pytest.fail(f"{what}, and {REQUIRED} is set")
-    pytest.skip(f"NO BROWSER TEST: {what}")
 
 
 @dataclass(frozen=True)
@@ -174,9 +166,9 @@ def browser() -> Iterator[Any]:
         (p for name in ("chromium", "chromium-browser", "google-chrome") if (p := shutil.which(name))), ""
     )
     if not path:
-        skip_loudly("Chromium is not installed (Debian: apt-get install chromium)")
+        skip_without("Chromium", "it is not installed (Debian: apt-get install chromium)")
     if not (ASSETS / "maplibre-gl.mjs").is_file():
-        skip_loudly("the page is not built (make web)")
+        skip_without("Chromium", "the page is not built (make web)")
     from playwright.sync_api import sync_playwright
 
     with sync_playwright() as playwright:
