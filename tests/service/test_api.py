@@ -344,6 +344,24 @@ def test_every_answer_has_the_headers_of_safety(app: Any) -> None:
         assert app.client.get(path).status_code == 404
 
 
+@pytest.mark.parametrize(
+    ("address", "more", "is_told"),
+    [
+        ("http://museum.example:8080", {}, False),
+        ("https://museum.example", {}, True),
+        ("http://museum.example", {"X-Forwarded-Proto": "https"}, True),
+        ("http://localhost:8080", {}, True),
+        ("http://127.0.0.1", {}, True),
+        ("http://localhost.example:8080", {}, False),
+    ],
+)
+def test_openers_are_shut_out_where_browsers_heed_it(
+    app: Any, address: str, more: dict[str, str], is_told: bool
+) -> None:
+    told = app.client.get(f"{address}/health", headers=more).headers.get("cross-origin-opener-policy")
+    assert told == ("same-origin" if is_told else None)
+
+
 def test_the_page_asks_no_other_host(app: Any) -> None:
     for path in ("/", "/web/page.js", "/web/page.css"):
         text = app.client.get(path).text

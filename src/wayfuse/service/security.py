@@ -40,11 +40,14 @@ HEADERS: Mapping[str, str] = MappingProxyType(
         ),
         "X-Content-Type-Options": "nosniff",
         "Referrer-Policy": "no-referrer",
-        "Cross-Origin-Opener-Policy": "same-origin",
         "Cross-Origin-Resource-Policy": "same-origin",
         "Cache-Control": "no-store",
     }
 )
+
+# browsers leave it out, with a warning on their console, where the page came unencrypted from another machine
+_OPENER_POLICY = (b"cross-origin-opener-policy", b"same-origin")
+_LOOPBACK = (b"localhost", b"127.0.0.1", b"[::1]")
 
 
 class SecurityHeaders:
@@ -59,15 +62,24 @@ class SecurityHeaders:
         if scope["type"] != "http":
             await self._app(scope, receive, send)
             return
+        wanted = [*self._headers, _OPENER_POLICY] if _is_trusted(scope) else self._headers
 
         async def sent(message: Message) -> None:
             if message["type"] == "http.response.start":
                 given = list(message.get("headers", ()))
                 names = {name for name, _ in given}
-                message["headers"] = given + [h for h in self._headers if h[0] not in names]
+                message["headers"] = given + [h for h in wanted if h[0] not in names]
             await send(message)
 
         await self._app(scope, receive, sent)
+
+
+def _is_trusted(scope: Scope) -> bool:
+    """Whether a browser trusts the way of a request: encrypted, also by a proxy before us, or of this machine."""
+    headers = dict(scope["headers"])
+    is_encrypted = scope["scheme"] == "https" or headers.get(b"x-forwarded-proto") == b"https"
+    host: bytes = headers.get(b"host", b"")
+    return is_encrypted or any(host == name or host.startswith(name + b":") for name in _LOOPBACK)
 
 
 class Authority:
