@@ -3,52 +3,31 @@
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 
+from csi_room import Room, make_room
 from wayfuse.core.errors import MapError
 from wayfuse.core.types import Array
-from wayfuse.maps.site import Site
 from wayfuse.models.channel_survey import anchor_distances
-from wayfuse.papers.li2015_channel import room_places
 from wayfuse.presets import fused
 from wayfuse.presets.li2015_tracker import build
-from wayfuse.radio.ap_places import ApPlaces
-from wayfuse.radio.channel_model import ChannelModel, fit_channel_model
 from wayfuse.radio.channel_ranging import ChannelRanging
 from wayfuse.sensors.quality import Verdict
 from wayfuse.sensors.recording import Recording
 from wayfuse.sensors.records import Waypoint
-from wayfuse.simulator.experiment import SimulatedWalk, make_world, plan_walks, simulate_plan
-from wayfuse.simulator.scenario_file import find_scenario, load_scenario_file
+from wayfuse.simulator.experiment import SimulatedWalk
 from wayfuse.tracking.dead_reckoning import Start
 from wayfuse.tracking.estimate import State
 from wayfuse.tracking.tracker import Tracker
 
 
-@dataclass(frozen=True)
-class Room:
-    site: Site
-    places: ApPlaces
-    model: ChannelModel
-    survey: SimulatedWalk
-    walks: tuple[SimulatedWalk, ...]
-
-
 @pytest.fixture(scope="module")
 def room() -> Room:
-    path = find_scenario("csi-room")
-    site, world = make_world(load_scenario_file(path), 0, path.parent)
-    plans = plan_walks(world)
-    survey = [simulate_plan(world, p) for p in plans if p.role == "survey"][:4]
-    walks = [simulate_plan(world, p) for p in plans if p.role == "walk"][:2]
-    frames = [frame for made in survey for frame in made.recording.csi]
-    places = room_places(world, sorted({frame.anchor for frame in frames}))
-    distances = np.concatenate([anchor_distances(site, made.recording, places) for made in survey])
-    return Room(site, places, fit_channel_model(frames, distances, site.name), survey[0], tuple(walks))
+    return make_room()
 
 
 def trackers(room: Room) -> dict[str, Tracker[Any]]:

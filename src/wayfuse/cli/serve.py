@@ -41,6 +41,9 @@ def serve(
     Phones post their records, tracks come out as GeoJSON, as a stream of events, and on the page at `/`. At the first
     start an administrator's token is printed, once; it makes the tokens of phones and readers.
 
+    Anchors that measure ranges are known by files in the site's folder: access_points.csv says where they hang,
+    channel.npz makes ranges of channel state (docs/server.md).
+
     Settings come from the options, the environment (`WAYFUSE_SERVER_PORT=8443`), the file of --config, in this order.
     """
     import os
@@ -66,9 +69,13 @@ def serve(
     if token is not None:
         click.echo(f"administrator's token, shown this once: {token}")
     for name in server.worlds:
-        if server.published(name) is None:
+        if server.map_in_use(name) is None:
             note = f"note: site {name} has no radio map yet; its phones are refused until one is published"
             click.echo(note, err=True)
+        elif server.published(name) is None:
+            click.echo(
+                f"note: site {name} has no radio map: phones are tracked by ranges to its anchors", err=True
+            )
     run(
         server,
         lambda address: click.echo(f"serving {', '.join(server.worlds) or 'no site yet'} at {address}"),

@@ -56,9 +56,7 @@ async def ingest(server: Server, site: str, adapter: str, body: bytes, profile: 
     pipeline = server.pipeline
     if pipeline is None:
         raise BusyError("the server is starting", remedy="send it again in a moment")
-    version = server.published_known(site)  # a hop to a thread and back costs more than all else here
-    if version is None:
-        version = await run_in_threadpool(server.published, site)
+    version = server.map_in_use(site)
     if version is None:
         raise UsageError(f"site {site} has no radio map yet", remedy="upload and publish one")
     arrived = server.clock()

@@ -28,8 +28,9 @@ from wayfuse.service.pipeline import BusyError, Pipeline, PipelineConfig, recove
 from wayfuse.service.positions import Json, feature, told
 from wayfuse.service.security import Authority
 from wayfuse.service.settings import Settings
+from wayfuse.service.site_anchors import read_site_anchors
 from wayfuse.service.uploaded_sites import UploadedSites
-from wayfuse.service.world import World, survey_of
+from wayfuse.service.world import NO_MAP, World, survey_of
 from wayfuse.service.zones import Zone, read_geofences
 from wayfuse.storage.audit import AuditLog
 from wayfuse.storage.database import open_database, take_lease
@@ -90,22 +91,22 @@ class Server:
         self.tracks, self.devices = TrackStore(self.engine), DeviceStore(self.engine)
         self.tokens, self.audit = TokenStore(self.engine, random), AuditLog(self.engine)
         self.metrics = Metrics()
-        self._published: dict[str, int] = {}
+        self._published: dict[str, int | None] = {}
         self.worlds: dict[str, World] = {}
         self.authority = Authority(
             self.tokens, RateLimit(settings.rate_per_s, settings.rate_burst, clock), clock
         )
         self.uploads = UploadedSites(data / "sites")
-        given = [(Site.load(files.folder), files.radio_map) for files in sites]
+        given = [(Site.load(files.folder), files) for files in sites]
         plans = {site.name: site for site in map(Site.load, self.uploads.folders())}
         plans |= {site.name: site for site, _ in given}  # the operator's own files go first
         self._fences: dict[str, list[Zone]] = (
             read_geofences(Path(settings.geofences), plans) if settings.geofences else {}
         )
-        maps = {site.name: radio_map for site, radio_map in given}
-        self.given = frozenset(maps)  # sites of the command line: they are changed there
+        files_of = {site.name: files for site, files in given}
+        self.given = frozenset(files_of)  # sites of the command line: they are changed there
         for site in plans.values():
-            self.worlds[site.name] = self.world_of(site, maps.get(site.name))
+            self.worlds[site.name] = self.world_of(site, files_of.get(site.name))
         config = LiveConfig(rewind=settings.rewind_s, spacing=settings.spacing_s)
         self.live = Live(self.worlds, self.tracks.state, config, settings.seed)
         self.hub = Hub(settings.events)
@@ -114,16 +115,18 @@ class Server:
         self.pipeline: Pipeline | None = None
         self._watch()
 
-    def world_of(self, site: Site, radio_map: Path | None = None) -> World:
-        """A site with all that tracking needs; a radio map is kept and published.
+    def world_of(self, site: Site, files: SiteFiles | None = None) -> World:
+        """A site with all that tracking needs; a radio map among its files is kept and published.
 
         Raises
         ------
         RadioMapError : the radio map, or the one in use, is not of this site.
+        UsageError : its files of anchors cannot be used.
         """
         digest = sha256(json.dumps(dict(site.provenance), sort_keys=True).encode()).hexdigest()
         self.sites.register(site.name, digest, self.clock())
-        if radio_map is not None:
+        if files is not None and files.radio_map is not None:
+            radio_map = files.radio_map
             version = self.add_radio_map(site, radio_map.read_bytes(), _OPERATOR, radio_map.name)
             if self.published(site.name) != version:
                 self.publish(site.name, version, _OPERATOR)
@@ -133,8 +136,9 @@ class Server:
             method=self.settings.method,
             n_particles=self.settings.particles,
             fences=self._fences.get(site.name, ()),
+            anchors=None if files is None else read_site_anchors(files.folder, site),
         )
-        version_in_use = self.published(site.name)
+        version_in_use = self._in_use(world)
         if version_in_use is not None:
             world.tracker(version_in_use)  # now, not when the first phone waits
         return world
@@ -154,15 +158,16 @@ class Server:
     def published(self, site: str) -> int | None:
         """The version of a site's radio map that is in use; remembered until another is published here."""
         if site not in self._published:
-            version = self.sites.published(site)
-            if version is None:
-                return None
-            self._published[site] = version
+            self._published[site] = self.sites.published(site)
         return self._published[site]
 
-    def published_known(self, site: str) -> int | None:
-        """As `published`, without a look into the database; None where that is needed."""
-        return self._published.get(site)
+    def map_in_use(self, site: str) -> int | None:
+        """What tracks that begin now go by: the version published, else `NO_MAP` where there are anchors, else None."""
+        return self._in_use(self.worlds[site])
+
+    def _in_use(self, world: World) -> int | None:
+        version = self.published(world.site.name)
+        return NO_MAP if version is None and world.anchors is not None else version
 
     def publish(self, site: str, version: int, actor: str) -> None:
         """Put a version of a radio map to use, for tracks that begin from now on.
@@ -172,7 +177,7 @@ class Server:
         RadioMapError : there is no such version.
         """
         self.sites.publish(site, version, self.clock(), actor)
-        self._published.pop(site, None)
+        self._published[site] = version
         if site in self.worlds:
             self.worlds[site].tracker(version)  # now, not when the first phone waits
         self.audit.add(self.clock(), actor, "publish radio map", site, f"version {version}")
@@ -185,7 +190,7 @@ class Server:
         RadioMapError : there is none.
         """
         version = self.sites.roll_back(site, self.clock(), actor)
-        self._published.pop(site, None)
+        self._published[site] = version
         self.audit.add(self.clock(), actor, "roll back radio map", site, f"version {version}")
         return version
 
