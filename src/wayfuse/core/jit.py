@@ -85,12 +85,9 @@ def bounded_kernel(function: F) -> F:
 def uncounted_kernel(function: F) -> F:
     """Compile a kernel that makes no array of its own, only views of the caller's: references are not counted.
 
-    To count them takes two locked additions per call of a helper with an array, more than short helpers take.
+    To count them takes two locked additions for each array of each call, more than a short helper takes for its work.
     """
-    known = COMPILED and hasattr(
-        _NUMBA.core.options.DefaultOptions, "_nrt"
-    )  # an option that numba does not document
-    return _compiled(function, fastmath=False, **({"_nrt": False} if known else {}))
+    return _compiled(function, fastmath=False, counted=False)
 
 
 def inline_kernel(function: F) -> F:
@@ -98,7 +95,9 @@ def inline_kernel(function: F) -> F:
     return _compiled(function, fastmath=False, inline="always")
 
 
-def _compiled(function: F, **options: Any) -> F:
+def _compiled(function: F, *, counted: bool = True, **options: Any) -> F:
     if _NUMBA is None:
         return function
+    if COMPILED and hasattr(_NUMBA.core.options.DefaultOptions, "_nrt"):  # numba does not document it
+        options["_nrt"] = counted  # always: a kernel without a word takes it from the one that calls it first
     return cast("F", _NUMBA.njit(cache=True, nogil=True, error_model="numpy", **options)(function))

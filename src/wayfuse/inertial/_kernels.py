@@ -1,30 +1,29 @@
 """The compiled core of the inertial front end: one record in, state changed, a step or nothing out.
 
 State ``s``, parameters ``p`` and events are float64 vectors (`_layout`): a checkpoint is one small copy.
-`consume` handles one record; `consume_series` walks the four motion series in the order of
-`Recording.records` and calls the same function, hence both give the same bits. The reasons for each rule
-stand in `attitude`, `heading`, `steps`.
+`consume` handles one record; `consume_series` walks the four motion series in the order of `Recording.records` and
+calls the same function, hence both give the same bits. Why each rule: `attitude`, `heading`, `steps`.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from wayfuse.core.jit import kernel
+from wayfuse.core.jit import uncounted_kernel
 from wayfuse.core.types import Array
 from wayfuse.inertial import _layout as at
 
 __all__ = ["consume", "consume_series", "heading_of"]
 
 
-@kernel
+@uncounted_kernel
 def wrap_angle(a: float) -> float:
     """Angle in (-pi, pi]."""
     return float(np.pi - (np.pi - a) % (2.0 * np.pi))
 
 
 # --- attitude ---------------------------------------------------------------------------------------------
-@kernel
+@uncounted_kernel
 def rotate_by(s: Array, rx: float, ry: float, rz: float, in_world: bool) -> None:
     """Turn the own attitude by a rotation vector given in world axes (left factor) or device axes (right)."""
     angle = np.sqrt(rx * rx + ry * ry + rz * rz)
@@ -40,7 +39,7 @@ def rotate_by(s: Array, rx: float, ry: float, rz: float, in_world: bool) -> None
     s[at.S_Q], s[at.S_Q + 1], s[at.S_Q + 2], s[at.S_Q + 3] = nw * n, nx * n, ny * n, nz * n
 
 
-@kernel
+@uncounted_kernel
 def to_world(s: Array, x: float, y: float, z: float) -> tuple[float, float, float]:
     """A device vector in east, north, up by the own attitude."""
     w, a, b, c = s[at.S_Q], s[at.S_Q + 1], s[at.S_Q + 2], s[at.S_Q + 3]
@@ -50,7 +49,7 @@ def to_world(s: Array, x: float, y: float, z: float) -> tuple[float, float, floa
     return e, n, u
 
 
-@kernel
+@uncounted_kernel
 def up_of(s: Array, p: Array, t: float) -> tuple[float, float, float]:
     """The vertical in device axes, from the recorded attitude where fresh, else from the own."""
     o = at.S_RV if t - s[at.S_T_RV] <= p[at.P_STALE] else at.S_Q
@@ -58,7 +57,7 @@ def up_of(s: Array, p: Array, t: float) -> tuple[float, float, float]:
     return 2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)
 
 
-@kernel
+@uncounted_kernel
 def level(s: Array, p: Array, t: float, dt: float, x: float, y: float, z: float) -> None:
     """Turn the own attitude so that the specific force points up: first at once, then slowly."""
     if s[at.S_Q_LEVEL] == 0.0:
@@ -76,7 +75,7 @@ def level(s: Array, p: Array, t: float, dt: float, x: float, y: float, z: float)
         rotate_by(s, gain * np.pi, 0.0, 0.0, True)
 
 
-@kernel
+@uncounted_kernel
 def point_north(s: Array, p: Array, t: float, dt: float, x: float, y: float, z: float) -> bool:
     """Turn the own attitude about the vertical so the field points north, unless disturbed."""
     norm = np.sqrt(x * x + y * y + z * z)
@@ -101,7 +100,7 @@ def point_north(s: Array, p: Array, t: float, dt: float, x: float, y: float, z: 
 
 
 # --- heading ----------------------------------------------------------------------------------------------
-@kernel
+@uncounted_kernel
 def heading_of(w: float, x: float, y: float, z: float) -> float:
     """Horizontal direction of the device's y axis, blending into that of its back when it stands upright."""
     e, n, u = 2.0 * (x * y - w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z + w * x)
@@ -113,7 +112,7 @@ def heading_of(w: float, x: float, y: float, z: float) -> float:
     return float(np.arctan2(n, e))
 
 
-@kernel
+@uncounted_kernel
 def learn_bias(s: Array, p: Array, t: float, dt: float, heading: float) -> None:
     """Bias of the yaw rate: drift of the raw yaw against the absolute heading, if beyond doubt."""
     raw = s[at.S_YAW_RAW] - heading
@@ -139,7 +138,7 @@ def learn_bias(s: Array, p: Array, t: float, dt: float, heading: float) -> None:
         s[at.S_DRIFT_0], s[at.S_DRIFT_T0] = s[at.S_DRIFT], t
 
 
-@kernel
+@uncounted_kernel
 def absolute_heading(s: Array, p: Array, t: float, dt: float, heading: float) -> None:
     """Take an absolute heading: as it is, or to pull the gyro's (running mean first, then exponential)."""
     s[at.S_HAS_HEADING] = 1.0
@@ -158,7 +157,7 @@ def absolute_heading(s: Array, p: Array, t: float, dt: float, heading: float) ->
     s[at.S_HEADING] = wrap_angle(s[at.S_YAW] + s[at.S_OFFSET]) if pulled else heading
 
 
-@kernel
+@uncounted_kernel
 def on_rotation_rate(s: Array, p: Array, t: float, dt: float, x: float, y: float, z: float) -> None:
     """Integrate the own attitude and the yaw about the vertical; notice gaps and shaking."""
     if not 0.0 < dt <= p[at.P_GAP]:  # turns may have been missed: trust the next absolute heading
@@ -182,7 +181,7 @@ def on_rotation_rate(s: Array, p: Array, t: float, dt: float, x: float, y: float
         s[at.S_HEADING] = wrap_angle(s[at.S_YAW] + s[at.S_OFFSET])
 
 
-@kernel
+@uncounted_kernel
 def remember_heading(s: Array, t: float) -> None:
     """Append the heading to the ring, at most every `RING_PERIOD`."""
     n = int(s[at.S_RING_N])
@@ -193,7 +192,7 @@ def remember_heading(s: Array, t: float) -> None:
     s[at.S_RING_N] = n + 1.0
 
 
-@kernel
+@uncounted_kernel
 def recall_heading(s: Array, t: float) -> float:
     """Heading remembered last before or at a time; the oldest kept where none is that old."""
     n = int(s[at.S_RING_N])
@@ -207,7 +206,7 @@ def recall_heading(s: Array, t: float) -> float:
 
 
 # --- steps ------------------------------------------------------------------------------------------------
-@kernel
+@uncounted_kernel
 def low_pass(s: Array, o: int, g: float, v: float) -> float:
     """Second-order Butterworth low-pass, state-variable form; memory s[o:o+2], g = tan(pi f T)."""
     a1 = 1.0 / (1.0 + g * (g + np.sqrt(2.0)))
@@ -218,7 +217,7 @@ def low_pass(s: Array, o: int, g: float, v: float) -> float:
     return float(v2)
 
 
-@kernel
+@uncounted_kernel
 def high_pass(s: Array, o: int, g: float, v: float) -> float:
     """Second-order Butterworth high-pass, the companion of `low_pass`."""
     k = np.sqrt(2.0)
@@ -230,7 +229,7 @@ def high_pass(s: Array, o: int, g: float, v: float) -> float:
     return float(v - k * v1 - v2)
 
 
-@kernel
+@uncounted_kernel
 def reset_steps(s: Array) -> None:
     """Forget the filters, the step under way and the remembered headings."""
     s[at.S_PERIOD : at.S_RING] = 0.0
@@ -238,7 +237,7 @@ def reset_steps(s: Array) -> None:
     s[at.S_VMAX], s[at.S_VMIN] = -np.inf, np.inf
 
 
-@kernel
+@uncounted_kernel
 def filter_acceleration(s: Array, p: Array, t: float, dt: float, x: float, y: float, z: float) -> float:
     """Feed one acceleration into the filters; the band-passed norm."""
     norm = np.sqrt(x * x + y * y + z * z)
@@ -259,7 +258,7 @@ def filter_acceleration(s: Array, p: Array, t: float, dt: float, x: float, y: fl
     return band
 
 
-@kernel
+@uncounted_kernel
 def on_acceleration(s: Array, p: Array, t: float, dt: float, x: float, y: float, z: float, e: Array) -> bool:
     """Feed one acceleration; True when it completes a step, which is then written to ``e``."""
     if not dt <= p[at.P_GAP]:
@@ -284,7 +283,7 @@ def on_acceleration(s: Array, p: Array, t: float, dt: float, x: float, y: float,
     return True
 
 
-@kernel
+@uncounted_kernel
 def finish_step(s: Array, p: Array, t: float, peak: float, event: Array) -> None:
     """Write a completed step and start the next."""
     is_first = not t - s[at.S_T_STEP] <= at.BOUT_GAP
@@ -304,7 +303,7 @@ def finish_step(s: Array, p: Array, t: float, peak: float, event: Array) -> None
     s[at.S_VMAX], s[at.S_VMIN] = -np.inf, np.inf
 
 
-@kernel
+@uncounted_kernel
 def step_length_of(p: Array, event: Array) -> float:
     """Length of a step (m) by the model in the parameters."""
     model, o = int(p[at.P_MODEL]), at.P_COEFFICIENT
@@ -324,7 +323,7 @@ def step_length_of(p: Array, event: Array) -> float:
 
 
 # --- records ----------------------------------------------------------------------------------------------
-@kernel
+@uncounted_kernel
 def consume(
     s: Array, p: Array, kind: int, t: float, a: float, b: float, c: float, d: float, event: Array
 ) -> bool:
@@ -361,7 +360,7 @@ def consume(
     return False
 
 
-@kernel
+@uncounted_kernel
 def consume_series(s: Array, p: Array, series: tuple[Array, ...], events: Array, trace: Array) -> int:
     """Feed four series merged by time (equal times: acceleration first, orientation last); number of steps.
 
@@ -386,7 +385,8 @@ def consume_series(s: Array, p: Array, series: tuple[Array, ...], events: Array,
             if consume(s, p, kind, t, va[i, 0], va[i, 1], va[i, 2], 0.0, events[n]):
                 n += 1
             if len(trace) > 0:
-                trace[i, :4] = s[at.S_Q : at.S_Q + 4]
+                for o in range(4):
+                    trace[i, o] = s[at.S_Q + o]
                 trace[i, 4] = s[at.S_HEADING]
             i += 1
         elif kind == at.ROTATION_RATE:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from wayfuse.core.jit import kernel
+from wayfuse.core.jit import kernel, uncounted_kernel
 from wayfuse.core.types import Array
 from wayfuse.inertial import _vertical_layout as at
 
@@ -26,7 +26,7 @@ LANDING = 4.0  # s, a landing between two flights
 N_SCRATCH = 3 * at.N_BRANCH
 
 
-@kernel
+@uncounted_kernel
 def turn(v: Array, dt: float, x: float, y: float, z: float) -> None:
     """Turn the vertical by a rotation rate; gather the rate at which it tilts."""
     ux, uy, uz = v[at.V_UP], v[at.V_UP + 1], v[at.V_UP + 2]
@@ -40,7 +40,7 @@ def turn(v: Array, dt: float, x: float, y: float, z: float) -> None:
         v[at.V_UP], v[at.V_UP + 1], v[at.V_UP + 2] = ux / norm, uy / norm, uz / norm
 
 
-@kernel
+@uncounted_kernel
 def lean(v: Array, p: Array, t: float, dt: float, x: float, y: float, z: float) -> None:
     """Draw the vertical to the specific force and gather the vertical part of that."""
     norm = np.sqrt(x * x + y * y + z * z)
@@ -64,14 +64,14 @@ def lean(v: Array, p: Array, t: float, dt: float, x: float, y: float, z: float) 
     v[at.V_A_N] += 1.0
 
 
-@kernel
+@uncounted_kernel
 def restart(v: Array) -> None:
     """Forget all histories and wait until the integral can be trusted again."""
     v[at.V_N_BRANCH] = 0.0
     v[at.V_REST] = REST
 
 
-@kernel
+@uncounted_kernel
 def integrate(v: Array, p: Array, now: float) -> float:
     """Close the bin: integrate the vertical force, note shaking; the double running mean of the integral."""
     if v[at.V_A_N] > 0.0:
@@ -97,7 +97,7 @@ def integrate(v: Array, p: Array, now: float) -> float:
     return mean
 
 
-@kernel
+@uncounted_kernel
 def begin_branch(b: Array, p: Array, mode: int, now: float) -> None:
     """Turn a copy of a level branch into one where a movement began a look ago."""
     is_resumed = b[at.B_LAST_MODE] == mode and now - b[at.B_LAST_ENDED] < LANDING
@@ -110,7 +110,7 @@ def begin_branch(b: Array, p: Array, mode: int, now: float) -> None:
     b[at.B_OS], b[at.B_BS], b[at.B_SS] = 0.0, 0.0, spread * spread
 
 
-@kernel
+@uncounted_kernel
 def end_branch(b: Array, p: Array, now: float) -> None:
     """Turn a copy of a moving branch into one where the movement ended a look ago."""
     b[at.B_WEIGHT] += np.log(LOOK * p[at.P_STOP])
@@ -121,7 +121,7 @@ def end_branch(b: Array, p: Array, now: float) -> None:
     b[at.B_OS], b[at.B_BS], b[at.B_SS] = 0.0, 0.0, 0.0
 
 
-@kernel
+@uncounted_kernel
 def update_branch(b: Array, p: Array, y: float, noise: float, now: float, is_walking: bool) -> None:
     """Kalman step of a branch: weigh it by how well it foretold the integral, then correct it."""
     dt, mode = LOOK, b[at.B_MODE]
@@ -154,7 +154,7 @@ def update_branch(b: Array, p: Array, y: float, noise: float, now: float, is_wal
         b[at.B_WEIGHT] -= dt * cost
 
 
-@kernel
+@uncounted_kernel
 def is_same(a: Array, b: Array) -> bool:
     """Whether two branches foretell the same from now on."""
     return bool(
@@ -226,7 +226,7 @@ def grow(v: Array, p: Array, y: float, now: float) -> None:
     keep_best(v, branches, n)
 
 
-@kernel
+@uncounted_kernel
 def judge_speed(v: Array, p: Array, now: float) -> bool:
     """Take in the bin that is complete; True where the branches are up to date."""
     y = integrate(v, p, now)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from wayfuse.core.jit import kernel
+from wayfuse.core.jit import uncounted_kernel
 from wayfuse.core.types import Array
 from wayfuse.inertial import _vertical_layout as at
 from wayfuse.inertial._speed_kernels import DELAY, judge_speed, lean, restart, turn
@@ -22,26 +22,26 @@ BELIEF_AGREED = 0.5  # belief of the accelerations from which they support the b
 SPEED_SPAN = 20  # ticks over which the speed of a lift or escalator is taken: 4 s
 
 
-@kernel
+@uncounted_kernel
 def recall(v: Array, ring: int, back: int) -> float:
     """Entry of a ring `back` ticks before the last judged one."""
     return float(v[ring + int(v[at.V_TICKS] - 1 - back) % at.N_RING])
 
 
-@kernel
+@uncounted_kernel
 def reach(v: Array) -> int:
     """How many ticks one may look back: to the end of the last movement, or `N_REACH`."""
     return int(min(v[at.V_TICKS] - 1 - v[at.V_FROM], at.N_REACH))
 
 
-@kernel
+@uncounted_kernel
 def steps_at(v: Array, now: float, t: float) -> float:
     """Steps counted until a time of the last 25 s."""
     back = int(min((now - t) / at.TICK, min(at.N_RING, v[at.V_TICKS]) - 1))
     return recall(v, at.V_RING_STEPS, max(back, 0))
 
 
-@kernel
+@uncounted_kernel
 def push(v: Array, p: Array) -> None:
     """Close the bin: its altitude, the running mean and the count of steps go into the rings."""
     n = int(v[at.V_TICKS]) % at.N_RING
@@ -58,7 +58,7 @@ def push(v: Array, p: Array) -> None:
     v[at.V_P_SUM], v[at.V_P_N] = 0.0, 0.0
 
 
-@kernel
+@uncounted_kernel
 def report(v: Array, p: Array, t: float, now: float, is_over: bool, e: Array) -> None:
     """Write a report of the movement under way."""
     ended = v[at.V_ENDED]
@@ -82,7 +82,7 @@ def report(v: Array, p: Array, t: float, now: float, is_over: bool, e: Array) ->
     v[at.V_REPORTED] = t
 
 
-@kernel
+@uncounted_kernel
 def end(v: Array, p: Array, t: float, now: float, e: Array) -> None:
     """Report the movement under way for the last time."""
     report(v, p, t, now, True, e)
@@ -90,13 +90,13 @@ def end(v: Array, p: Array, t: float, now: float, e: Array) -> None:
     v[at.V_FROM] = v[at.V_TICKS] - 1.0
 
 
-@kernel
+@uncounted_kernel
 def carried_by(v: Array, p: Array, speed: float) -> float:
     """Lift or escalator: on an escalator one steps while it runs, and it is slower than lifts are."""
     return at.ESCALATOR if v[at.V_ONTO] > 0.0 and speed < p[at.P_LIFT_SPEED] else at.LIFT
 
 
-@kernel
+@uncounted_kernel
 def note_start(v: Array, now: float, began: float) -> None:
     """Keep when a movement began, the steps until then, and whether one stepped onto it."""
     v[at.V_BEGAN], v[at.V_STEPS0] = began, steps_at(v, now, began)
@@ -105,7 +105,7 @@ def note_start(v: Array, now: float, began: float) -> None:
 
 
 # --- with a barometer -------------------------------------------------------------------------------------
-@kernel
+@uncounted_kernel
 def classify(v: Array, p: Array, now: float) -> None:
     """Stairs where one steps, else a lift or an escalator."""
     if reach(v) >= SPEED_SPAN:
@@ -118,7 +118,7 @@ def classify(v: Array, p: Array, now: float) -> None:
         v[at.V_BEHAVIOUR] = carried_by(v, p, v[at.V_SPEED])
 
 
-@kernel
+@uncounted_kernel
 def gradual_rise(v: Array, p: Array, back: int) -> float:
     """Rise over the last ticks (m, not negative) less its fastest part, made up for the time that takes.
 
@@ -135,7 +135,7 @@ def gradual_rise(v: Array, p: Array, back: int) -> float:
     return float((abs(rise) - most) * back / (back - width))
 
 
-@kernel
+@uncounted_kernel
 def begin_pressed(v: Array, p: Array, now: float) -> bool:
     """Find a movement where the altitude has risen or fallen enough."""
     far = reach(v)
@@ -160,7 +160,7 @@ def begin_pressed(v: Array, p: Array, now: float) -> bool:
     return True
 
 
-@kernel
+@uncounted_kernel
 def is_over_pressed(v: Array, p: Array, now: float) -> bool:
     """Follow a movement; whether the altitude has stayed."""
     classify(v, p, now)
@@ -173,7 +173,7 @@ def is_over_pressed(v: Array, p: Array, now: float) -> bool:
 
 
 # --- without ----------------------------------------------------------------------------------------------
-@kernel
+@uncounted_kernel
 def belief(v: Array, sign: float) -> float:
     """Probability that one moves up (sign 1), down (-1) or not at all (0), by the branches."""
     total = 0.0
@@ -186,7 +186,7 @@ def belief(v: Array, sign: float) -> float:
     return float(total)
 
 
-@kernel
+@uncounted_kernel
 def best_branch(v: Array) -> int:
     """Place of the most probable branch in the memory."""
     best = at.V_BRANCHES
@@ -197,7 +197,7 @@ def best_branch(v: Array) -> int:
     return best
 
 
-@kernel
+@uncounted_kernel
 def begin_unpressed(v: Array, p: Array, now: float) -> bool:
     """Find a movement that the branches believe in."""
     b = best_branch(v)
@@ -215,7 +215,7 @@ def begin_unpressed(v: Array, p: Array, now: float) -> bool:
     return True
 
 
-@kernel
+@uncounted_kernel
 def is_over_unpressed(v: Array, p: Array, now: float) -> bool:
     """Follow a movement; whether the branches believe that it is over, or that there was none."""
     if v[at.V_N_BRANCH] == 0.0:  # shaken or silent: what is known stays
@@ -241,7 +241,7 @@ def is_over_unpressed(v: Array, p: Array, now: float) -> bool:
 
 
 # --- records ----------------------------------------------------------------------------------------------
-@kernel
+@uncounted_kernel
 def tick(v: Array, p: Array, t: float, e: Array) -> bool:
     """Judge the bin that is complete; True when there is a report in ``e``."""
     push(v, p)
@@ -270,7 +270,7 @@ def tick(v: Array, p: Array, t: float, e: Array) -> bool:
     return False
 
 
-@kernel
+@uncounted_kernel
 def advance(v: Array, p: Array, t: float, e: Array) -> bool:
     """Judge the bins that are complete at time t; True when there is a report (an end is never hidden)."""
     number = np.floor(t / at.TICK)
@@ -296,7 +296,7 @@ def advance(v: Array, p: Array, t: float, e: Array) -> bool:
     return found
 
 
-@kernel
+@uncounted_kernel
 def finish(v: Array, p: Array, t: float, e: Array) -> bool:
     """End the movement under way at the end of the recording."""
     if v[at.V_BEHAVIOUR] == 0.0:
@@ -307,7 +307,7 @@ def finish(v: Array, p: Array, t: float, e: Array) -> bool:
     return True
 
 
-@kernel
+@uncounted_kernel
 def consume(v: Array, p: Array, kind: int, t: float, a: float, b: float, c: float, e: Array) -> bool:
     """Feed one record of a kind; True when it completes a report, written to ``e`` (N_EVENT,)."""
     # NaN compares false; 1e6 of any unit is a fault, and would stay in the sums for good
@@ -342,7 +342,7 @@ def consume(v: Array, p: Array, kind: int, t: float, a: float, b: float, c: floa
     return found
 
 
-@kernel
+@uncounted_kernel
 def consume_series(v: Array, p: Array, series: tuple[Array, ...], steps: Array, events: Array) -> int:
     """Feed three series and the step times merged by time (a step last at equal times); number of reports."""
     ta, va, tg, vg, tp, vp = series
