@@ -74,6 +74,7 @@ def create_app(server: Server) -> FastAPI:
     web = (zones, web_plan, web_particles, web_radio, web_survey, web_assets)
     for part in (inputs, outputs, stream, sites, admin, pages, *web):
         app.include_router(part.router)
+    app.include_router(web_survey.by_path)
     handle_problems(app)
     app.add_middleware(SecurityHeaders)
     return app

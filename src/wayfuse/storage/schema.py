@@ -40,12 +40,25 @@ METADATA = MetaData()
 # SQLite counts rows by INTEGER PRIMARY KEY alone; as BIGINT the key would be a second tree
 _WIDE = BigInteger().with_variant(Integer, "sqlite")
 
+
+def _text(name: str) -> Column[str]:
+    return Column(name, Text, nullable=False)
+
+
+def _double(name: str) -> Column[float]:
+    return Column(name, Double, nullable=False)
+
+
+def _integer(name: str) -> Column[int]:
+    return Column(name, Integer, nullable=False)
+
+
 sites = Table(
     "sites",
     METADATA,
     Column("name", Text, primary_key=True),
-    Column("digest", Text, nullable=False),
-    Column("added", Double, nullable=False),
+    _text("digest"),
+    _double("added"),
 )
 
 radio_maps = Table(
@@ -53,9 +66,9 @@ radio_maps = Table(
     METADATA,
     Column("site", Text, primary_key=True),
     Column("version", Integer, primary_key=True, autoincrement=False),
-    Column("sha256", Text, nullable=False),
-    Column("created", Double, nullable=False),
-    Column("note", Text, nullable=False),
+    _text("sha256"),
+    _double("created"),
+    _text("note"),
     Column("archive", LargeBinary, nullable=False),
     ForeignKeyConstraint(["site"], ["sites.name"]),
 )
@@ -65,10 +78,10 @@ publications = Table(
     "publications",
     METADATA,
     Column("id", _WIDE, primary_key=True, autoincrement=True),
-    Column("site", Text, nullable=False),
-    Column("version", Integer, nullable=False),
-    Column("at", Double, nullable=False),
-    Column("actor", Text, nullable=False),
+    _text("site"),
+    _integer("version"),
+    _double("at"),
+    _text("actor"),
     ForeignKeyConstraint(["site", "version"], ["radio_maps.site", "radio_maps.version"]),
 )
 
@@ -77,12 +90,12 @@ ingest_log = Table(
     "ingest_log",
     METADATA,
     Column("seq", _WIDE, primary_key=True, autoincrement=False),
-    Column("arrived", Double, nullable=False),
-    Column("site", Text, nullable=False),
-    Column("adapter", Text, nullable=False),
-    Column("device", Text, nullable=False),
-    Column("track", Text, nullable=False),
-    Column("profile", Text, nullable=False),
+    _double("arrived"),
+    _text("site"),
+    _text("adapter"),
+    _text("device"),
+    _text("track"),
+    _text("profile"),
     Column("body", LargeBinary, nullable=False),
     Index("ix_ingest_log_track", "track"),
     Index("ix_ingest_log_arrived", "arrived"),
@@ -92,11 +105,11 @@ tracks = Table(
     "tracks",
     METADATA,
     Column("track", Text, primary_key=True),
-    Column("site", Text, nullable=False),
-    Column("device", Text, nullable=False),
-    Column("map_version", Integer, nullable=False),
-    Column("started", Double, nullable=False),
-    Column("heard", Double, nullable=False),
+    _text("site"),
+    _text("device"),
+    _integer("map_version"),
+    _double("started"),
+    _double("heard"),
     Index("ix_tracks_heard", "heard"),
     Index("ix_tracks_device", "device"),
 )
@@ -106,20 +119,14 @@ estimates = Table(
     METADATA,
     Column("track", Text, primary_key=True),
     Column("n", Integer, primary_key=True, autoincrement=False),
-    Column("t", Double, nullable=False),
-    Column("x", Double, nullable=False),
-    Column("y", Double, nullable=False),
-    Column("floor", Integer, nullable=False),
-    Column("cov_xx", Double, nullable=False),
-    Column("cov_xy", Double, nullable=False),
-    Column("cov_yy", Double, nullable=False),
-    Column("r68", Double, nullable=False),
-    Column("r95", Double, nullable=False),
-    Column("state", Text, nullable=False),
-    Column("n_steps", Integer, nullable=False),
-    Column("n_aps", Integer, nullable=False),
-    Column("share_blocked", Double, nullable=False),
-    Column("ess", Double, nullable=False),
+    *map(_double, ("t", "x", "y")),
+    _integer("floor"),
+    *map(_double, ("cov_xx", "cov_xy", "cov_yy", "r68", "r95")),
+    _text("state"),
+    _integer("n_steps"),
+    _integer("n_aps"),
+    _double("share_blocked"),
+    _double("ess"),
     ForeignKeyConstraint(["track"], ["tracks.track"]),
 )
 
@@ -143,11 +150,11 @@ tokens = Table(
     "tokens",
     METADATA,
     Column("id", Text, primary_key=True),
-    Column("digest", Text, nullable=False),
-    Column("scopes", Text, nullable=False),
-    Column("site", Text, nullable=False),  # empty: all sites
-    Column("label", Text, nullable=False),
-    Column("created", Double, nullable=False),
+    _text("digest"),
+    _text("scopes"),
+    _text("site"),  # empty: all sites
+    _text("label"),
+    _double("created"),
     Column("expires", Double, nullable=True),
     Column("revoked", Double, nullable=True),
 )
@@ -156,20 +163,20 @@ devices = Table(
     "devices",
     METADATA,
     Column("device", Text, primary_key=True),
-    Column("platform", Text, nullable=False),  # empty: not stated
+    _text("platform"),  # empty: not stated
     Column("standardised", Boolean, nullable=False),
-    Column("label", Text, nullable=False),
-    Column("enrolled", Double, nullable=False),
+    _text("label"),
+    _double("enrolled"),
 )
 
 audit = Table(
     "audit",
     METADATA,
     Column("id", _WIDE, primary_key=True, autoincrement=True),
-    Column("at", Double, nullable=False),
-    Column("actor", Text, nullable=False),
-    Column("action", Text, nullable=False),
-    Column("subject", Text, nullable=False),
-    Column("detail", Text, nullable=False),
+    _double("at"),
+    _text("actor"),
+    _text("action"),
+    _text("subject"),
+    _text("detail"),
     Index("ix_audit_at", "at"),
 )

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import hashlib
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
-from sqlalchemy import Connection, Engine, func, insert, select, update
+from sqlalchemy import Column, Connection, Engine, func, insert, select, update
 
 from wayfuse.core.errors import RadioMapError
 from wayfuse.storage.schema import publications, radio_maps, sites
 
 __all__ = ["RadioMapVersion", "SiteStore"]
+
+T = TypeVar("T")
 
 
 class RadioMapVersion(NamedTuple):
@@ -82,13 +84,7 @@ class SiteStore:
         RadioMapError : there is no such version.
         """
         with self._engine.connect() as connection:
-            query = select(radio_maps.c.archive).where(
-                radio_maps.c.site == site, radio_maps.c.version == version
-            )
-            found = connection.execute(query).scalar()
-        if found is None:
-            raise _no_version(site, version)
-        return bytes(found)
+            return bytes(_of_version(connection, radio_maps.c.archive, site, version))
 
     def published(self, site: str) -> int | None:
         """The version in use, None where none was ever published."""
@@ -103,11 +99,7 @@ class SiteStore:
         RadioMapError : there is no such version.
         """
         with self._engine.begin() as connection:
-            query = select(radio_maps.c.version).where(
-                radio_maps.c.site == site, radio_maps.c.version == version
-            )
-            if connection.execute(query).scalar() is None:
-                raise _no_version(site, version)
+            _of_version(connection, radio_maps.c.version, site, version)
             _publish(connection, site, version, now, actor)
 
     def roll_back(self, site: str, now: float, actor: str) -> int:
@@ -131,10 +123,15 @@ class SiteStore:
             return int(before[-1])
 
 
-def _no_version(site: str, version: int) -> RadioMapError:
-    return RadioMapError(
-        f"site {site} has no version {version} of its radio map", remedy="list the versions first"
-    )
+def _of_version(connection: Connection, column: Column[T], site: str, version: int) -> T:
+    """What a column has of a version; a RadioMapError where there is no such version."""
+    query = select(column).where(radio_maps.c.site == site, radio_maps.c.version == version)
+    found = connection.execute(query).scalar()
+    if found is None:
+        raise RadioMapError(
+            f"site {site} has no version {version} of its radio map", remedy="list the versions first"
+        )
+    return found
 
 
 def _published(connection: Connection, site: str) -> int | None:

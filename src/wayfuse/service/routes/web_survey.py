@@ -26,13 +26,18 @@ from wayfuse.service.web.surveys import Surveys, surveys_of
 from wayfuse.service.wire import Ap, Scan
 from wayfuse.storage.tokens import Token
 
-__all__ = ["router"]
+__all__ = ["by_path", "router"]
 
-router = APIRouter(tags=["survey"])
 
 _WAYS = {"sensor-logger": "sensor-logger", "own": "own", "data": "find3"}
 _SAY_TO_USER = 499  # Sensor Logger shows the text of this answer on the phone
-_REFUSALS = responses(400, 401, 403, 404, 408, 413, 415, 422, 429)
+router = APIRouter(
+    prefix="/api/v1/survey",
+    tags=["survey"],
+    dependencies=[Depends(SCHEME)],
+    responses=responses(400, 401, 403, 404, 408, 413, 415, 422, 429),
+)
+by_path = APIRouter()  # with the token in the address
 Surveyor = Annotated[Token, Depends(allowed("survey"))]
 Site = Annotated[str, Query(max_length=200, description="Name of the site; not needed where there is one.")]
 Seconds = Annotated[float, Field(ge=0.0, le=1e11, allow_inf_nan=False)]
@@ -72,9 +77,7 @@ class NewWalk(BaseModel):
     taps: Annotated[list[Tap], Field(min_length=2, max_length=10_000)]
 
 
-@router.get(
-    "/api/v1/survey", summary="What the survey has", dependencies=[Depends(SCHEME)], responses=_REFUSALS
-)
+@router.get("", summary="What the survey has")
 def survey(request: Request, token: Surveyor, site: Site = "") -> dict[str, Any]:
     """Phones that push scans, walks, recordings, and the last job."""
     server, surveys = server_of(request), surveys_of(request)
@@ -84,14 +87,7 @@ def survey(request: Request, token: Surveyor, site: Site = "") -> dict[str, Any]
         "site": name,
         "now": server.clock(),
         "phones": [{"device": p.device, "heard": p.heard, "scans": p.scans} for p in store.phones()],
-        "walks": [
-            {
-                "id": k,
-                "device": w.device,
-                "taps": [{"t": p.t, "floor": p.floor, "x": p.x, "y": p.y} for p in w.waypoints],
-            }
-            for k, w in store.walks().items()
-        ],
+        "walks": [_walk(k, w) for k, w in store.walks().items()],
         "recordings": [
             {"id": k, "name": p.name[17:], "bytes": p.stat().st_size} for k, p in store.recordings().items()
         ],
@@ -100,11 +96,9 @@ def survey(request: Request, token: Surveyor, site: Site = "") -> dict[str, Any]
 
 
 @router.post(
-    "/api/v1/survey/walks",
+    "/walks",
     status_code=201,
     summary="Keep a walk tapped on the map",
-    dependencies=[Depends(SCHEME)],
-    responses=_REFUSALS,
 )
 def add_walk(request: Request, token: Surveyor, walk: NewWalk, site: Site = "") -> dict[str, Any]:
     """A place where somebody stood is two taps at one place; between two taps the way is straight and even."""
@@ -127,11 +121,9 @@ def add_walk(request: Request, token: Surveyor, walk: NewWalk, site: Site = "") 
 
 
 @router.post(
-    "/api/v1/survey/recordings",
+    "/recordings",
     status_code=201,
     summary="Upload a survey recording",
-    dependencies=[Depends(SCHEME)],
-    responses=_REFUSALS,
     openapi_extra={
         "requestBody": {
             "required": True,
@@ -172,10 +164,8 @@ def _keep_recording(
 
 
 @router.delete(
-    "/api/v1/survey/parts/{identifier}",
+    "/parts/{identifier}",
     summary="Delete a walk or a recording",
-    dependencies=[Depends(SCHEME)],
-    responses=_REFUSALS,
 )
 def remove(request: Request, token: Surveyor, identifier: str, site: Site = "") -> dict[str, Any]:
     """Radio maps built with it stay as they are."""
@@ -188,11 +178,9 @@ def remove(request: Request, token: Surveyor, identifier: str, site: Site = "") 
 
 
 @router.post(
-    "/api/v1/survey/jobs",
+    "/jobs",
     status_code=202,
     summary="Build a radio map of what the survey has",
-    dependencies=[Depends(SCHEME)],
-    responses=_REFUSALS,
 )
 def start_job(request: Request, token: Surveyor, site: Site = "") -> dict[str, Any]:
     """The job's result names the new version, which is not yet published, and its held-out errors room by room."""
@@ -212,10 +200,8 @@ def start_job(request: Request, token: Surveyor, site: Site = "") -> dict[str, A
 
 
 @router.get(
-    "/api/v1/survey/jobs/{job}",
+    "/jobs/{job}",
     summary="How far a job is",
-    dependencies=[Depends(SCHEME)],
-    responses=_REFUSALS,
 )
 def job(request: Request, token: Surveyor, job: int) -> dict[str, Any]:
     """``state`` is running, done or failed; ``share`` runs from 0 to 1."""
@@ -225,7 +211,7 @@ def job(request: Request, token: Surveyor, job: int) -> dict[str, Any]:
     return found._asdict()
 
 
-@router.post("/in/{token}/survey/{way}", include_in_schema=False)
+@by_path.post("/in/{token}/survey/{way}", include_in_schema=False)
 async def take(request: Request, token: str, way: str) -> Response:
     """Scans for the survey, from a client without headers; where a radio map is in use, the phone is tracked too."""
     if way not in _WAYS:
