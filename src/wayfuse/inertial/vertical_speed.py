@@ -24,9 +24,7 @@ stairs and 0.4 m/s and more of lifts. The vertical is the own one: rotation rate
 1 s (2, 3 and 5 s are worse with gyros that have a bias). Without a gyroscope only lifts are found, from a phone
 that stands: while walking the tilt is not known well enough.
 
-False movements at the default belief: 7 in 4.46 h of level walks of ms-indoor (452 walks, survey; 3 of them of more
-than 0.8 m), none in 2.08 h of ipin2023-track3, none on HCU's eight. Lifts without gyroscope and barometer: 4 of 4,
-none false.
+How many movements are found and how many are false: docs/results.md (`wayfuse results --only behaviours`).
 
 What it cannot do: tell a ramp from level ground (0.1 m/s), know the height of stairs well (the count of steps gives
 it, `VerticalConfig.riser`), see through shaking, or always tell a phone that is raised by 0.3 m within a second
