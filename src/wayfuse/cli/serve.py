@@ -24,17 +24,20 @@ __all__ = ["serve"]
 @click.option("--data", help="Folder of the database and the key of the pseudonyms.  [default: wayfuse-data]")
 @click.option("--database", help="URL of a PostgreSQL database, instead of SQLite in the data folder.")
 @click.option(
+    "--mqtt", help="URL of a broker to listen to and to tell positions, mqtt://HOST:PORT or mqtts://."
+)
+@click.option("--geofences", help="GeoJSON file of areas to watch besides the rooms of the plans.")
+@click.option("--tls-certificate", help="PEM file; with the key, the server speaks HTTPS.")
+@click.option("--tls-key", help="PEM file.")
+@click.option(
     "--new-admin-token", is_flag=True, help="Make another administrator's token: the first is lost."
 )
 def serve(
     site_folders: tuple[Path, ...],
     radio_maps: tuple[Path, ...],
     config: Path | None,
-    host: str | None,
-    port: int | None,
-    data: str | None,
-    database: str | None,
     new_admin_token: bool,
+    **given: str | int | None,
 ) -> None:
     """Serve live positions in SITE... over HTTP; without a SITE, in those that were imported over the page.
 
@@ -61,7 +64,6 @@ def serve(
         ) from error
     from wayfuse.service.settings import load_settings
 
-    given = {"host": host, "port": port, "data": data, "database": database}
     settings = load_settings(config, os.environ, given)
     sites = match_radio_maps(site_folders, radio_maps)
     server = Server(settings, sites, clock=time.time, random=secrets.token_bytes)
