@@ -2,7 +2,7 @@
 
 Copy this file to ``src/wayfuse/radio/<method>.py``, rename the class and the kind, and replace the method. Then add
 
-* a branch for the kind to ``wayfuse.radio.archive._rebuilt``, so that saved maps load again,
+* a branch for the kind to ``wayfuse.radio.map_file._rebuilt``, so that saved maps load again,
 * a row to ``FITS`` in ``tests/radio/radio_map_contract.py``: the contract tests then run on the new map,
 * a section to ``docs/methods.md`` and a line to ``CHANGELOG.md``.
 
@@ -82,7 +82,7 @@ class PlaceMeansMap:
         return mixture_log_likelihood(weight, self.xy, self.floor, xy, floor, self.bandwidth)
 
     def parts(self) -> tuple[str, Mapping[str, Any], Mapping[str, NDArray[Any]]]:
-        """Kind, parameters and arrays for `wayfuse.radio.archive.save`."""
+        """Kind, parameters and arrays for `wayfuse.radio.map_file.save`."""
         values = {name: getattr(self, name) for name in ("sigma", "missing", "bandwidth")}
         arrays = {name: getattr(self, name) for name in ("bssid", "xy", "floor", "mean")}
         return "place_means", {"floors": list(self.floors), **values}, arrays

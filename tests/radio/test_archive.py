@@ -12,8 +12,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from wayfuse.core.errors import RadioMapError
-from wayfuse.radio.archive import load_survey, read_archive, save_survey, write_archive
+from wayfuse.radio.archive import read_archive, write_archive
 from wayfuse.radio.survey import Survey
+from wayfuse.radio.survey_file import load_survey, save_survey
 
 
 def _survey() -> Survey:

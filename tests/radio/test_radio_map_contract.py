@@ -9,7 +9,8 @@ import pytest
 from radio_map_contract import FITS, field, fingerprint, made_up_survey, queries
 
 from wayfuse.core.errors import RadioMapError
-from wayfuse.radio.archive import load, read_archive, save, write_archive
+from wayfuse.radio.archive import read_archive, write_archive
+from wayfuse.radio.map_file import load, save
 from wayfuse.radio.radio_map import RadioMap
 from wayfuse.radio.survey import Fingerprint, Survey
 

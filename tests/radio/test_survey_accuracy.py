@@ -13,9 +13,9 @@ import numpy as np
 import pytest
 
 from wayfuse.core.errors import RadioMapError
-from wayfuse.radio.archive import load_survey, save_survey
 from wayfuse.radio.survey import Survey
 from wayfuse.radio.survey_accuracy import held_out_errors, survey_accuracy
+from wayfuse.radio.survey_file import load_survey, save_survey
 
 
 def walks(

@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 from wayfuse.core.errors import RadioMapError
-from wayfuse.radio.archive import save_survey, write_archive
+from wayfuse.radio.archive import write_archive
+from wayfuse.radio.survey_file import save_survey
 from wayfuse.radio.walk_survey import SurveyParameters, SurveyWalk, WalkRadioMap, load, survey_from_walks
 from wayfuse.sensors.records import WifiScan
 

@@ -105,7 +105,7 @@ class GaussianKernelMap:
         return np.asarray(-0.5 * self.exponent * squared / self.sigma**2)
 
     def parts(self) -> tuple[str, Mapping[str, Any], Mapping[str, NDArray[Any]]]:
-        """Kind, parameters and arrays for `wayfuse.radio.archive.save`."""
+        """Kind, parameters and arrays for `wayfuse.radio.map_file.save`."""
         values = {name: getattr(self, name) for name in ("sigma", "missing", "n_neighbours", "exponent")}
         arrays = {name: getattr(self, name) for name in ("bssid", "xy", "floor", "mean")}
         return "gaussian_kernel", {"floors": list(self.floors), **values}, arrays

@@ -150,7 +150,7 @@ class GaussianProcessMap:
         return self.noise.exponent * out
 
     def parts(self) -> tuple[str, Mapping[str, Any], Mapping[str, NDArray[Any]]]:
-        """Kind, parameters and arrays for `wayfuse.radio.archive.save`."""
+        """Kind, parameters and arrays for `wayfuse.radio.map_file.save`."""
         n = self.noise
         header = {
             "floors": list(self.floors),

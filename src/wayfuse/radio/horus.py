@@ -109,7 +109,7 @@ class HorusMap:
         return mixture_log_likelihood(weight[0], places, floors, xy, floor, self.bandwidth)
 
     def parts(self) -> tuple[str, Mapping[str, Any], Mapping[str, NDArray[Any]]]:
-        """Kind, parameters and arrays for `wayfuse.radio.archive.save`."""
+        """Kind, parameters and arrays for `wayfuse.radio.map_file.save`."""
         names = ("bssid", "xy", "floor", "mean", "sigma", "heard")
         values = {"n_candidates": self.n_candidates, "exponent": self.exponent, "bandwidth": self.bandwidth}
         return "horus", {"floors": list(self.floors), **values}, {name: getattr(self, name) for name in names}

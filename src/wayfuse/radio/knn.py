@@ -117,8 +117,8 @@ class KnnMap:
         return mixture_log_likelihood(weight[0], places, floors, xy, floor, self.bandwidth)
 
     def parts(self) -> tuple[str, Mapping[str, Any], Mapping[str, NDArray[Any]]]:
-        """Kind, parameters and arrays for `wayfuse.radio.archive.save`."""
-        from wayfuse.radio.archive import survey_parts
+        """Kind, parameters and arrays for `wayfuse.radio.map_file.save`."""
+        from wayfuse.radio.survey_file import survey_parts
 
         header, arrays = survey_parts(self.survey)
         r = self.representation

@@ -59,7 +59,7 @@ class NnssMap:
         return self.neighbour.log_likelihood(fingerprint, xy, floor)
 
     def parts(self) -> tuple[str, Mapping[str, Any], Mapping[str, NDArray[Any]]]:
-        """Kind, parameters and arrays for `wayfuse.radio.archive.save`."""
+        """Kind, parameters and arrays for `wayfuse.radio.map_file.save`."""
         _, header, arrays = self.neighbour.parts()
         return "nnss", header, arrays
 

@@ -63,7 +63,7 @@ class RadioMap(Protocol):
         ...
 
     def parts(self) -> tuple[str, Mapping[str, Any], Mapping[str, NDArray[Any]]]:
-        """Kind, JSON-able parameters and arrays: what `wayfuse.radio.archive.save` writes."""
+        """Kind, JSON-able parameters and arrays: what `wayfuse.radio.map_file.save` writes."""
         ...
 
 

@@ -17,11 +17,12 @@ from numpy.typing import NDArray
 
 from wayfuse.core.errors import RadioMapError
 from wayfuse.core.types import Array
-from wayfuse.radio.archive import read_archive, survey_from_parts, survey_parts, write_archive
+from wayfuse.radio.archive import read_archive, write_archive
 from wayfuse.radio.device_survey import device_shifts, normalised
 from wayfuse.radio.scans import Readings, readings
 from wayfuse.radio.survey import Survey
 from wayfuse.radio.survey_accuracy import survey_accuracy
+from wayfuse.radio.survey_file import survey_from_parts, survey_parts
 from wayfuse.sensors.records import WifiScan
 
 __all__ = ["SurveyParameters", "SurveyWalk", "WalkRadioMap", "load", "survey_from_walks"]
