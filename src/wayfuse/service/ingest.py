@@ -73,7 +73,9 @@ async def ingest(server: Server, site: str, adapter: str, body: bytes, profile: 
     seqs: list[int] = []
     if items:
         try:
-            seqs = await asyncio.wrap_future(pipeline.submit(items))
+            done: asyncio.Future[list[int]] = asyncio.get_running_loop().create_future()
+            pipeline.put(items, done)
+            seqs = await done
         except BusyError:
             server.metrics.bodies.labels(adapter, "busy").inc()
             raise

@@ -1,9 +1,10 @@
 """From accepted batches to tracks: one thread that writes the log and then feeds the tracks.
 
 Whatever waits is written as one group in one transaction, so that the price of a sync is shared; only then are the
-senders answered. After that the group goes into the tracks, in the order of the log. A round of checkpoints now and
-then keeps the part of the log short that must be read again after a crash; a few tracks at a time, between groups, so
-that no phone waits for the checkpoints of all.
+senders answered. Where batches come from many at once, a moment is waited for more of them: a transaction and a change
+of threads cost far more than a batch. After that the group goes into the tracks, in the order of the log. A round of
+checkpoints now and then keeps the part of the log short that must be read again after a crash; a few tracks at a time,
+between groups, so that no phone waits for the checkpoints of all.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from collections import deque
 from collections.abc import Callable, Collection, Sequence
 from concurrent.futures import Future
 from dataclasses import dataclass
-from typing import NamedTuple, TypeVar
+from typing import NamedTuple, Protocol, TypeVar
 
 from sqlalchemy.exc import SQLAlchemyError
 
@@ -30,6 +31,7 @@ _log = logging.getLogger(__name__)
 
 
 T = TypeVar("T")
+_TOLD_AT_ONCE = 32  # entries in the tracks before what they changed is told: the first need not wait for the last
 
 
 class BusyError(WayfuseError):
@@ -48,6 +50,7 @@ class PipelineConfig:
     """Limits and periods.
 
     max_waiting, max_waiting_bytes : what may wait to be written. group : most entries of one transaction.
+    gather : s that are waited for more, after a group of several. enough : entries for which nothing is waited for.
     checkpoint_every : s between rounds of checkpoints. slice : tracks that are written at once.
     retry_every : s until a database that was away is asked again.
     idle : s until a silent track leaves the memory.
@@ -56,6 +59,8 @@ class PipelineConfig:
     max_waiting: int = 10_000
     max_waiting_bytes: int = 256 << 20
     group: int = 512
+    gather: float = 0.02
+    enough: int = 32
     checkpoint_every: float = 10.0
     slice: int = 20
     retry_every: float = 1.0
@@ -63,21 +68,51 @@ class PipelineConfig:
 
     def __post_init__(self) -> None:
         if (
-            min(self.max_waiting, self.max_waiting_bytes, self.group, self.slice) < 1
+            min(self.max_waiting, self.max_waiting_bytes, self.group, self.enough, self.slice) < 1
             or not self.checkpoint_every > 0.0
+            or not self.gather >= 0.0
         ):
             raise ConfigError("the limits of the pipeline must be positive", where="PipelineConfig")
 
 
+class Done(Protocol):
+    """Who waits for a batch: a future of a thread or of an event loop."""
+
+    def done(self) -> bool:
+        """Whether it waits no more."""
+        ...
+
+    def set_result(self, seqs: list[int], /) -> None:
+        """The batch is on the disk."""
+        ...
+
+    def set_exception(self, error: BusyError, /) -> None:
+        """It is not."""
+        ...
+
+
 class _Waiting(NamedTuple):
     items: Sequence[Item]
-    done: Future[list[int]]
+    done: Done
+
+    def accept(self, first: int) -> None:
+        if not self.done.done():
+            self.done.set_result(list(range(first, first + len(self.items))))
+
+    def refuse(self, what: str, remedy: str) -> None:
+        if not self.done.done():
+            self.done.set_exception(BusyError(what, remedy=remedy))
+
+
+def _at_once(do: Callable[[], None]) -> None:
+    do()
 
 
 class Pipeline:
     """The thread.
 
     clock : gives Unix s. publish : called, in the thread, with what a group changed and the seq of its last entry.
+    answer : calls what tells the senders of a group, once for all of them, where their futures may be touched.
     """
 
     def __init__(
@@ -89,6 +124,7 @@ class Pipeline:
         *,
         clock: Callable[[], float],
         publish: Callable[[list[Applied], int], None],
+        answer: Callable[[Callable[[], None]], None] = _at_once,
         config: PipelineConfig | None = None,
     ) -> None:
         self.applied = next_seq - 1  # seq of the last entry that is in the tracks
@@ -96,7 +132,7 @@ class Pipeline:
         self.is_broken = False
         self._config = config or PipelineConfig()
         self._log, self._live, self._tracks = log, live, tracks
-        self._clock, self._publish = clock, publish
+        self._clock, self._publish, self._answer = clock, publish, answer
         self._next = next_seq
         self._kept = self.applied  # seq of the last round
         self._round: tuple[int, list[str]] | None = None  # its seq, and tracks still to be written
@@ -106,6 +142,7 @@ class Pipeline:
         self._bytes = 0
         self._unsaved: list[tuple[int, list[Checkpoint]]] = []  # those that could not be written
         self._wake = threading.Condition()
+        self._is_gathering = self._were_several = False
         self._stopping = False
         self._thread = threading.Thread(target=self._run, name="wayfuse-pipeline", daemon=True)
 
@@ -127,8 +164,18 @@ class Pipeline:
         ------
         BusyError : too much waits already, or the server is going down.
         """
-        size = sum(len(item.entry.body) for item in items)
         done: Future[list[int]] = Future()
+        self.put(items, done)
+        return done
+
+    def put(self, items: Sequence[Item], done: Done) -> None:
+        """As `submit`, with a future of the caller's; ``answer`` must be able to touch it.
+
+        Raises
+        ------
+        BusyError : too much waits already, or the server is going down.
+        """
+        size = sum(len(item.entry.body) for item in items)
         with self._wake:
             is_full = self.n_waiting + len(items) > self._config.max_waiting
             if (
@@ -140,8 +187,8 @@ class Pipeline:
             self._queue.append(_Waiting(items, done))
             self.n_waiting += len(items)
             self._bytes += size
-            self._wake.notify()
-        return done
+            if not self._is_gathering or self.n_waiting >= self._config.enough:
+                self._wake.notify()
 
     def call(self, do: Callable[[], T]) -> Future[T]:
         """Do something in the thread, between two groups, when nothing moves.
@@ -173,8 +220,7 @@ class Pipeline:
             with self._wake:
                 self._stopping, self.is_broken = True, True
                 lost, self._queue = list(self._queue), deque()
-            for waiting in lost:
-                waiting.done.set_exception(BusyError("the server is broken", remedy="tell its operator"))
+            self._refuse(lost, "the server is broken", "tell its operator")
 
     def _work(self) -> None:
         while True:
@@ -196,15 +242,41 @@ class Pipeline:
         with self._wake:
             if not (self._queue or self._calls or self._stopping or self._round):
                 self._wake.wait(min(1.0, self._config.checkpoint_every))
+            self._gather()
             group: list[_Waiting] = []
             n = 0
             while self._queue and (not group or n + len(self._queue[0].items) <= self._config.group):
                 group.append(self._queue.popleft())
                 n += len(group[-1].items)
             self.n_waiting -= n
+            self._were_several = len(group) > 1 if group else self._were_several
             self._bytes -= sum(len(i.entry.body) for w in group for i in w.items)
             calls, self._calls = self._calls, []
             return group, calls
+
+    def _gather(self) -> None:
+        """Wait a moment for more; senders do not wake the thread meanwhile. The lock is held."""
+        is_worth_it = self._were_several and self._queue and self.n_waiting < self._config.enough
+        if is_worth_it and not (self._calls or self._stopping):
+            self._is_gathering = True
+            self._wake.wait(self._config.gather)
+            self._is_gathering = False
+
+    def _refuse(self, group: list[_Waiting], what: str, remedy: str) -> None:
+        def tell() -> None:
+            for waiting in group:
+                waiting.refuse(what, remedy)
+
+        self._answer(tell)
+
+    def _accept(self, group: list[_Waiting], first: int) -> None:
+        def tell() -> None:
+            seq = first
+            for waiting in group:
+                waiting.accept(seq)
+                seq += len(waiting.items)
+
+        self._answer(tell)
 
     def _do(self, group: list[_Waiting]) -> None:
         seq, numbered = self._next, list[Item]()
@@ -216,22 +288,18 @@ class Pipeline:
             self._log.append([item.entry for item in numbered])
         except SQLAlchemyError as error:
             _log.error("the log cannot be written: %s", type(error).__name__)
-            for waiting in group:
-                waiting.done.set_exception(
-                    BusyError("the log cannot be written now", remedy="send it again later")
-                )
+            self._refuse(group, "the log cannot be written now", "send it again later")
             return
-        self._next, first = seq, numbered[0].entry.seq
-        for waiting in group:
-            waiting.done.set_result(list(range(first, first + len(waiting.items))))
-            first += len(waiting.items)
-        changes = []
-        for item in numbered:
-            applied = self._apply(item)
-            if applied is not None:
-                changes.append(applied)
-            self.applied = item.entry.seq
-        self._publish(changes, self.applied)
+        first, self._next = self._next, seq
+        self._accept(group, first)
+        for start in range(0, len(numbered), _TOLD_AT_ONCE):
+            changes = []
+            for item in numbered[start : start + _TOLD_AT_ONCE]:
+                applied = self._apply(item)
+                if applied is not None:
+                    changes.append(applied)
+                self.applied = item.entry.seq
+            self._publish(changes, self.applied)
 
     def _apply(self, item: Item) -> Applied | None:
         """Apply an entry; it is in the log, so wait for a database that is away rather than leave it out."""

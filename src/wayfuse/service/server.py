@@ -230,6 +230,7 @@ class Server:
             next_seq,
             clock=self.clock,
             publish=self._publish,
+            answer=self._in_loop,
             config=PipelineConfig(
                 max_waiting=self.settings.max_waiting,
                 checkpoint_every=self.settings.checkpoint_s,
@@ -307,9 +308,16 @@ class Server:
         now = self.clock()
         for applied in changes:
             self.metrics.latency.observe(max(0.0, now - applied.view.row.heard))
-        if self._loop is not None and not self._loop.is_closed():
+        if self._loop is not None:
             events = [event for applied in changes for event in self._events(applied)]
-            self._loop.call_soon_threadsafe(self.hub.publish, events, last)
+            self._in_loop(lambda: self.hub.publish(events, last))
+
+    def _in_loop(self, do: Callable[[], None]) -> None:
+        """Do something where futures and events are waited for; here, where nobody waits."""
+        if self._loop is None:
+            do()
+        elif not self._loop.is_closed():
+            self._loop.call_soon_threadsafe(do)
 
     def _watch(self) -> None:
         watch = self.metrics.watch
