@@ -31,7 +31,9 @@ _log = logging.getLogger(__name__)
 
 
 T = TypeVar("T")
-_TOLD_AT_ONCE = 32  # entries in the tracks before what they changed is told: the first need not wait for the last
+_TOLD_AT_ONCE = (
+    32  # entries in the tracks before what they changed is told: the first need not wait for the last
+)
 
 
 class BusyError(WayfuseError):

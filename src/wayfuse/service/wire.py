@@ -38,7 +38,7 @@ Quad = tuple[float, float, float, float, float]  # time and a quaternion w, x, y
 T = TypeVar("T")
 
 
-class Ap(msgspec.Struct, array_like=True, frozen=True):
+class Ap(msgspec.Struct, array_like=True, frozen=True, gc=False):
     """One reading: [bssid, rssi (dBm), frequency (MHz, 0 unknown), last seen (s, null unknown)]."""
 
     bssid: Name
@@ -54,7 +54,7 @@ class Scan(msgspec.Struct, frozen=True):
     aps: list[Ap]
 
 
-class Advertisement(msgspec.Struct, array_like=True, frozen=True):
+class Advertisement(msgspec.Struct, array_like=True, frozen=True, gc=False):
     """A Bluetooth advertisement: [t, id, rssi (dBm), tx power (dBm, null unknown)]."""
 
     t: float
@@ -63,7 +63,7 @@ class Advertisement(msgspec.Struct, array_like=True, frozen=True):
     tx_power: float | None = None
 
 
-class Distance(msgspec.Struct, array_like=True, frozen=True):
+class Distance(msgspec.Struct, array_like=True, frozen=True, gc=False):
     """A range: [t, anchor, distance (m), sigma (m, null unknown), rssi (dBm, null unknown)]."""
 
     t: float
@@ -73,7 +73,7 @@ class Distance(msgspec.Struct, array_like=True, frozen=True):
     rssi: float | None = None
 
 
-class Stepped(msgspec.Struct, array_like=True, frozen=True):
+class Stepped(msgspec.Struct, array_like=True, frozen=True, gc=False):
     """A step the phone worked out: [t, heading (rad counter-clockwise from east), length (m, null unknown)]."""
 
     t: float

@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
+from wayfuse.core.types import IdArray
 from wayfuse.formats.assembly import assemble
-from wayfuse.formats.columns import Column, Piece, Rows
+from wayfuse.formats.columns import Column, LineArray, Piece
 from wayfuse.sensors.quality import ReadReport
 from wayfuse.sensors.records import Range, Record, Step
 from wayfuse.service.adapters.parts import digest_key, identifier, merged, notes_of
 from wayfuse.service.message import Message, Part, Profile
-from wayfuse.service.wire import Distance, Envelope, Stepped, check_count, decode
+from wayfuse.service.wire import Advertisement, Ap, Distance, Envelope, Scan, Stepped, check_count, decode
 
 __all__ = ["Own"]
 
@@ -29,10 +30,14 @@ class Own:
         envelope = decode(body, Envelope)
         check_count(_count(envelope))
         report = ReadReport()
-        recording = assemble([Piece(_columns(envelope))], report, name="", clock="", one_stream=False)
+        columns = _columns(envelope)
+        sensed: Iterable[Record] = ()
+        if columns:
+            recording = assemble([Piece(columns)], report, name="", clock="", one_stream=False)
+            sensed = recording.records()
         ranges = [_range(row) for row in envelope.ranges if _is_possible(row, report)]
         steps = [_step(row) for row in envelope.steps]
-        records = merged(recording.records(), [*ranges, *steps])
+        records = merged(sensed, [*ranges, *steps])
         key = digest_key(body) if envelope.id is None else f"id {envelope.id}"
         return [
             Message(
@@ -57,29 +62,49 @@ def _columns(envelope: Envelope) -> dict[str, Column]:
         rows: Sequence[tuple[float, ...]] = getattr(envelope, kind)
         if rows:
             values = np.array(rows, np.float64)
-            line = np.arange(1, len(rows) + 1)
-            columns[kind] = Column(line, values[:, 0], values[:, 1:], np.empty(0, np.uint64))
-    rows_of = Rows()
-    n = 0
-    for scan in envelope.wifi:
-        for ap in scan.aps:
-            n += 1
-            seen = math.nan if ap.seen is None else ap.seen
-            rows_of.add("wifi", n, scan.t, (ap.rssi, ap.mhz, seen), identifier(ap.bssid))
-    for n, heard in enumerate(envelope.ble, 1):
-        power = math.nan if heard.tx_power is None else heard.tx_power
-        rows_of.add("ble", n, heard.t, (heard.rssi, power), identifier(heard.id))
-    return columns | rows_of.columns()
+            columns[kind] = Column(_lines(len(rows)), values[:, 0], values[:, 1:], np.empty(0, np.uint64))
+    if any(scan.aps for scan in envelope.wifi):
+        columns["wifi"] = _wifi(envelope.wifi)
+    if envelope.ble:
+        columns["ble"] = _ble(envelope.ble)
+    return columns
+
+
+def _wifi(scans: Sequence[Scan]) -> Column:
+    """Readings of all scans. Column by column: a scan has hundreds, and a phone sends one every other second."""
+    aps: list[Ap] = [ap for scan in scans for ap in scan.aps]
+    t = np.repeat([scan.t for scan in scans], [len(scan.aps) for scan in scans])
+    values = np.empty((len(aps), 3))
+    values[:, 0] = [ap.rssi for ap in aps]
+    values[:, 1] = [ap.mhz for ap in aps]
+    values[:, 2] = [_known(ap.seen) for ap in aps]
+    return Column(_lines(len(aps)), t, values, _identifiers([ap.bssid for ap in aps]))
+
+
+def _ble(heard: Sequence[Advertisement]) -> Column:
+    t = np.array([h.t for h in heard], np.float64)
+    values = np.array([(h.rssi, _known(h.tx_power)) for h in heard], np.float64)
+    return Column(_lines(len(heard)), t, values, _identifiers([h.id for h in heard]))
+
+
+def _lines(n: int) -> LineArray:
+    return np.arange(1, n + 1)
+
+
+def _identifiers(texts: Iterable[str]) -> IdArray:
+    return np.array(list(map(identifier, texts)), np.uint64)
+
+
+def _known(value: float | None) -> float:
+    return math.nan if value is None else value
 
 
 def _step(row: Stepped) -> Record:
-    return Step(row.t, math.nan if row.length is None else row.length, row.heading)
+    return Step(row.t, _known(row.length), row.heading)
 
 
 def _range(row: Distance) -> Record:
-    sigma = math.nan if row.sigma is None else row.sigma
-    rssi = math.nan if row.rssi is None else row.rssi
-    return Range(row.t, identifier(row.anchor), row.distance, sigma, rssi)
+    return Range(row.t, identifier(row.anchor), row.distance, _known(row.sigma), _known(row.rssi))
 
 
 def _is_possible(row: Distance, report: ReadReport) -> bool:

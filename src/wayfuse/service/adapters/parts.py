@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import heapq
 from collections.abc import Iterable, Mapping, Sequence
+from functools import lru_cache
 from hashlib import blake2b
 from operator import attrgetter
 
@@ -13,6 +14,9 @@ from wayfuse.sensors.records import Record, Waypoint, bssid_id
 __all__ = ["digest_key", "identifier", "merged", "notes_of"]
 
 _DIGEST = 1 << 63
+_REMEMBERED = (
+    1 << 15
+)  # names; a building has thousands of access points, a phone hears the same ones again and again
 
 
 def digest_key(body: bytes) -> str:
@@ -20,6 +24,7 @@ def digest_key(body: bytes) -> str:
     return "of " + blake2b(body, digest_size=12).hexdigest()
 
 
+@lru_cache(_REMEMBERED)
 def identifier(text: str) -> int:
     """64-bit identifier of an access point or beacon; also takes back what `bssid_text` wrote of a digest."""
     if text.startswith("#") and len(text) == 17:
@@ -33,6 +38,8 @@ def identifier(text: str) -> int:
 def merged(records: Iterable[Record], more: Sequence[Record] = ()) -> tuple[Record, ...]:
     """Records in time order, without what a surveyor stated: truth is no input."""
     ordered = sorted(more, key=attrgetter("t"))
+    if not records:
+        return tuple(ordered)
     return tuple(r for r in heapq.merge(records, ordered, key=attrgetter("t")) if not isinstance(r, Waypoint))
 
 
