@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from wayfuse.service.adapters import ADAPTERS
-from wayfuse.service.routes import admin, inputs, outputs, pages, stream
+from wayfuse.service.app import PARTS
 from wayfuse.service.settings import Settings
 from wayfuse.storage.tokens import SCOPES
 
@@ -40,8 +40,18 @@ def test_every_way_in_is_documented(adapter: str) -> None:
 
 
 def test_routes_of_the_page_exist() -> None:
-    known = {route.path for part in (admin, inputs, outputs, pages, stream) for route in part.router.routes}
+    known = {route.path for router in PARTS for route in router.routes}
     patterns = [re.compile(re.sub(r"\{\w+\}", "[^/]+", path)) for path in known]
     named = set(re.findall(r"(?<!wayfuse)/(?:api/v1|in)/[\w/-]+\w", PAGE)) | {"/metrics"}
     for path in named - {"/in/TOKEN"}:
         assert any(p.fullmatch(path) for p in patterns), path
+
+
+def test_every_route_that_is_described_is_on_the_page() -> None:
+    described = {r.path for router in PARTS for r in router.routes if getattr(r, "include_in_schema", False)}
+    missing = []
+    for path in described:
+        pattern = re.sub(r"{\w+}", "[A-Z]+", path)
+        if not re.search(pattern + r"(?![\w/-])", PAGE):
+            missing.append(path)
+    assert missing == []

@@ -32,8 +32,11 @@ from wayfuse.service.security import SecurityHeaders
 from wayfuse.service.server import Server
 from wayfuse.service.web.surveys import Surveys
 
-__all__ = ["create_app"]
+__all__ = ["PARTS", "create_app"]
 
+_ROUTES = (inputs, outputs, stream, sites, admin, pages, zones)
+_WEB = (web_plan, web_particles, web_radio, web_survey, web_assets)
+PARTS = (*(part.router for part in (*_ROUTES, *_WEB)), web_survey.by_path)
 _log = logging.getLogger(__name__)
 _AGAIN_S, _TIMES = 2.0, 4  # s between words to a task that it should end, and how many
 _CLEAN_S = 600.0  # between deletions of what is too old
@@ -71,10 +74,8 @@ def create_app(server: Server) -> FastAPI:
         redoc_url=None,
     )
     app.state.server, app.state.surveys = server, surveys
-    web = (zones, web_plan, web_particles, web_radio, web_survey, web_assets)
-    for part in (inputs, outputs, stream, sites, admin, pages, *web):
-        app.include_router(part.router)
-    app.include_router(web_survey.by_path)
+    for router in PARTS:
+        app.include_router(router)
     handle_problems(app)
     app.add_middleware(SecurityHeaders)
     return app

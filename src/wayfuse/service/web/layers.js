@@ -48,7 +48,7 @@ const LAYERS = [
   },
   {
     id: "fence-names", type: "symbol", source: "zones", filter: kind("geofence"), minzoom: 16,
-    layout: { "text-field": ["get", "name"], "text-font": FONT, "text-size": 12, "symbol-placement": "line", "text-offset": [0, 0.8] },
+    layout: { "text-field": ["get", "name"], "text-font": FONT, "text-size": 12, "symbol-placement": "line", "symbol-spacing": 600, "text-offset": [0, 0.8] },
     paint: (p) => ({ "text-color": p.zone, "text-halo-color": p.halo, "text-halo-width": 1.5 }),
   },
   { id: "radii-95", type: "fill", source: "radii", filter: ["==", ["get", "share"], 95], paint: () => ({ "fill-color": ["get", "colour"], "fill-opacity": 0.1 }) },
