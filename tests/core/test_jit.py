@@ -58,16 +58,16 @@ import scipy.linalg.cython_blas
 load_compiler()  # leaves alone what is loaded
 assert sys.modules["scipy.linalg"] is scipy.linalg
 import numpy as np
-from wayfuse.radio._kernels import nearest
-index, best = np.empty(2, np.int32), np.empty(2, np.float32)
-nearest(np.array([3, 1, 2], np.float32), 2, index, best)
-print(index)
+from wayfuse.filters._kernels import floor_masses
+mass = np.empty(2)
+floor_masses(np.array([0, 1, 1], np.int32), np.array([0.5, 0.25, 0.25]), mass)
+print(mass)
 """
 
 
 def test_what_the_compiler_is_kept_from_can_be_loaded_afterwards() -> None:
     done = subprocess.run([sys.executable, "-c", AFTERWARDS], capture_output=True, text=True, check=False)
-    assert done.stdout == "[1 2]\n", done.stderr[-3000:]
+    assert done.stdout == "[0.5 0.5]\n", done.stderr[-3000:]
 
 
 def test_a_kernel_that_counts_no_references_leaves_those_of_its_arrays_alone() -> None:

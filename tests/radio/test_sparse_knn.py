@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
 from wayfuse.core.errors import ConfigError, RadioMapError
-from wayfuse.radio._kernels import nearest
+from wayfuse.radio._kernels import nearest_by_overlap
 from wayfuse.radio.sparse_knn import SparseKnn
 from wayfuse.radio.survey import Fingerprint, Survey
 
@@ -112,9 +112,11 @@ def test_a_fix_is_the_mean_on_the_heaviest_floor() -> None:
     hnp.arrays(np.float32, st.integers(0, 40), elements=st.sampled_from([0.0, 0.25, 0.5, 0.5, 1.0])),
     st.integers(1, 12),
 )
-def test_the_kernel_picks_as_a_stable_sort_does(distance: np.ndarray, k: int) -> None:
+def test_the_kernel_picks_as_a_stable_sort_does(overlap: np.ndarray, k: int) -> None:
     index, best = np.empty(k, np.int32), np.empty(k, np.float32)
-    n = nearest(distance, k, index, best)
+    row_sum, query_sum = np.full(len(overlap), 1.5, np.float32), np.float32(0.7)
+    n = nearest_by_overlap(overlap, row_sum, query_sum, k, index, best)
+    distance = np.float32(1.0) - np.float32(2.0) * overlap / (row_sum + query_sum + np.float32(1e-6))
     want = np.argsort(distance, kind="stable")[:k]
     assert n == len(want)
     np.testing.assert_array_equal(index[:n], want)
@@ -129,3 +131,17 @@ def test_wrong_use_is_refused() -> None:
         SparseKnn(survey, temperature=0.0)
     with pytest.raises(RadioMapError, match="has no fingerprint"):
         SparseKnn(survey.select(np.zeros(60, bool)))
+
+
+@pytest.mark.parametrize("n", [1, 39, 512, 513, 2000])
+def test_neighbours_are_the_nearest_of_all_distances_to_the_last_bit(n: int) -> None:
+    radio_map = SparseKnn(made_up(n))
+    for seed in range(5):
+        near = radio_map.neighbours(query(seed))
+        distance, _ = radio_map.distances(query(seed))
+        order = np.argsort(distance, kind="stable")[:40]
+        assert near is not None
+        assert near.distance == distance[order[0]]
+        np.testing.assert_array_equal(near.x, radio_map.survey.xy[order, 0].astype(np.float32))
+        weight = np.exp(-(distance[order] - distance[order[0]]) / np.float32(0.02))
+        np.testing.assert_array_equal(near.weight, (weight / weight.sum()).astype(np.float32))

@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 
 from wayfuse.core.errors import ConfigError, RadioMapError
 from wayfuse.core.types import Array32
-from wayfuse.radio._kernels import accumulate_overlap, nearest, nearest_mean_distances
+from wayfuse.radio._kernels import accumulate_overlap, nearest_by_overlap, nearest_mean_distances
 from wayfuse.radio.survey import Fingerprint, Fix, Survey
 from wayfuse.radio.twins import twin_shares
 
@@ -109,25 +109,31 @@ class SparseKnn:
 
     def distances(self, fingerprint: Fingerprint) -> tuple[Array32, int]:
         """(n,) distance to every fingerprint, and how many access points of the query are known."""
+        overlap, query_sum, n_aps = self._overlap(fingerprint)
+        total = self._row_sum + query_sum + np.float32(1e-6)
+        distance: Array32 = np.float32(1.0) - np.float32(2.0) * overlap / total
+        return distance, n_aps
+
+    def _overlap(self, fingerprint: Fingerprint) -> tuple[Array32, np.float32, int]:
+        """(n,) overlap with every fingerprint, the sum of the query, and how many of its access points are known."""
         column = self.survey.columns(fingerprint.bssid)
         known = column >= 0
         column = column[known]
         value, weight = self._represent(fingerprint.rssi[known]), self._weight[column]
         overlap = np.zeros(len(self.survey), np.float32)
         accumulate_overlap(column, value, weight, self._start, self._rows, self._values, overlap)
-        total = self._row_sum + np.float32(np.sum(weight * value)) + np.float32(1e-6)
-        distance: Array32 = np.float32(1.0) - np.float32(2.0) * overlap / total
-        return distance, int(np.count_nonzero(weight * value > 0.0))
+        weighted = weight * value
+        return overlap, np.float32(np.sum(weighted)), int(np.count_nonzero(weighted > 0.0))
 
     def neighbours(self, fingerprint: Fingerprint, without_walk: int | None = None) -> Neighbours | None:
         """The k nearest, those of one walk left out; None where the survey knows no access point of the query."""
-        distance, n_aps = self.distances(fingerprint)
+        overlap, query_sum, n_aps = self._overlap(fingerprint)
         if without_walk is not None:
-            distance[self.survey.walk == without_walk] = 1.0
+            overlap[self.survey.walk == without_walk] = 0.0
         if n_aps == 0:
             return None
         index, best = np.empty(self.k, np.int32), np.empty(self.k, np.float32)
-        n = nearest(distance, self.k, index, best)
+        n = nearest_by_overlap(overlap, self._row_sum, query_sum, self.k, index, best)
         index, best = index[:n], best[:n]
         weight = np.exp(-(best - best[0]) / np.float32(self.temperature))
         s = self.survey
