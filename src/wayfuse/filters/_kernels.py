@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from wayfuse.core.jit import fast_kernel, kernel
 from wayfuse.core.types import Array, Array32
 
-__all__ = ["floor_masses", "geometric_median", "normalise", "scatter"]
+__all__ = ["floor_masses", "geometric_median", "normalise", "reaching", "scatter"]
 
 
 @kernel
@@ -114,3 +114,24 @@ def scatter(
         xy += w * dx * dy
         yy += w * dy * dy
     return xx / total, xy / total, yy / total
+
+
+@kernel
+def reaching(order: NDArray[np.uint64], weights: Array, low: float, high: float) -> tuple[int, int]:
+    """Particles with which the weight, summed in an order, reaches two shares of itself, the lower first.
+
+    order : (N,), the number of the particle in its lower 32 bits.
+    """
+    n, low_32 = order.shape[0], np.uint64(0xFFFFFFFF)
+    total = 0.0
+    for i in range(n):
+        total += weights[order[i] & low_32]
+    at, reached = 0, weights[order[0] & low_32]
+    while reached < low * total and at < n - 1:
+        at += 1
+        reached += weights[order[at] & low_32]
+    first = at
+    while reached < high * total and at < n - 1:
+        at += 1
+        reached += weights[order[at] & low_32]
+    return int(order[first] & low_32), int(order[at] & low_32)

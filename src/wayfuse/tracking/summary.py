@@ -14,7 +14,7 @@ import numpy as np
 
 from wayfuse.core.errors import ConfigError
 from wayfuse.core.types import Array, Array32
-from wayfuse.filters._kernels import floor_masses, geometric_median, scatter
+from wayfuse.filters._kernels import floor_masses, geometric_median, reaching, scatter
 from wayfuse.filters.particle_filter import Snapshot
 from wayfuse.maps.walkable import Walkable
 from wayfuse.tracking.estimate import Estimate, State
@@ -82,7 +82,10 @@ def on_walkable(estimate: Estimate, cloud: Snapshot, walkable: tuple[Walkable, .
 
 
 def _weighted_quantiles(values: Array32, weights: Array, shares: tuple[float, float]) -> tuple[float, float]:
-    order = np.argsort(values)
-    total = np.cumsum(weights[order])
-    i, j = np.minimum(np.searchsorted(total, np.asarray(shares) * total[-1]), len(values) - 1)
-    return float(values[order[i]]), float(values[order[j]])
+    """Weighted quantiles of values that are not negative: the bits of such numbers sort as the numbers do."""
+    order = values.view(np.uint32).astype(np.uint64)
+    order <<= np.uint64(32)
+    order |= np.arange(len(values), dtype=np.uint64)
+    order.sort()  # keys are sorted several times as fast as places are found
+    i, j = reaching(order, weights, *shares)
+    return float(values[i]), float(values[j])
