@@ -8,6 +8,7 @@ import threading
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 from sqlalchemy.exc import SQLAlchemyError
@@ -62,7 +63,12 @@ class Applied(NamedTuple):
 
 def profile_json(profile: Profile, map_version: int) -> str:
     """What the log keeps beside a body: no names, those are pseudonyms in their own columns."""
-    kept = {"platform": profile.platform, "standardised": profile.standardised, "map": map_version}
+    return _kept_json(profile.platform, profile.standardised, map_version)
+
+
+@lru_cache(64)
+def _kept_json(platform: str, standardised: bool, map_version: int) -> str:
+    kept = {"platform": platform, "standardised": standardised, "map": map_version}
     return json.dumps(kept, separators=(",", ":"))
 
 
