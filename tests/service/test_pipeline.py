@@ -6,6 +6,7 @@ import asyncio
 import itertools
 import threading
 from collections.abc import Callable, Iterator
+from concurrent.futures import Future
 from contextlib import contextmanager
 from typing import Any
 
@@ -28,6 +29,7 @@ class Fake:
 
     def __init__(self) -> None:
         self.logged: list[int] = []
+        self.groups: list[int] = []
         self.applied: list[int] = []
         self.saved: list[tuple[int, list[Any]]] = []
         self.rounds: list[int] = []
@@ -42,6 +44,7 @@ class Fake:
             self.fail_append -= 1
             raise AWAY
         self.logged += [e.seq for e in entries]
+        self.groups.append(len(entries))
 
     def apply(self, entry: Entry, _message: Message) -> None:
         """Of the tracks."""
@@ -107,6 +110,41 @@ def test_entries_are_logged_then_answered_then_applied_in_order() -> None:
     assert fake.rounds == [6]
 
 
+def test_after_a_group_of_several_more_is_waited_for() -> None:
+    fake = Fake()
+    fake.gate.clear()
+    with working(fake, gather=60.0, enough=3) as pipeline:
+        pipeline.submit([_item()])
+        wait_until(lambda: pipeline.n_waiting == 0)  # taken, and held at the gate
+        several = [pipeline.submit([_item()]) for _ in range(2)]
+        fake.gate.set()
+        assert [f.result(30) for f in several] == [[2], [3]]
+        more = [pipeline.submit([_item()]) for _ in range(3)]
+        assert [f.result(30) for f in more] == [[4], [5], [6]]  # enough: nothing more is waited for
+        last = pipeline.submit([_item()])
+        assert not last.done()
+    assert last.result(0) == [7]  # nor at the end
+    assert fake.groups == [1, 2, 3, 1]
+
+
+def test_one_that_sends_alone_is_not_kept_waiting() -> None:
+    fake = Fake()
+    with working(fake, gather=60.0) as pipeline:
+        assert [pipeline.submit([_item()]).result(30) for _ in range(5)] == [[n] for n in range(1, 6)]
+
+
+def test_a_sender_that_has_gone_is_not_told() -> None:
+    fake = Fake()
+    fake.fail_append = 1  # of the first group
+    with working(fake, group=1) as pipeline:
+        for _ in range(2):  # one is refused, one accepted
+            gone = Future[list[int]]()
+            gone.cancel()
+            pipeline.put([_item()], gone)
+        assert pipeline.submit([_item()]).result(30) == [2]
+    assert fake.applied == [1, 2]
+
+
 def test_a_log_that_cannot_be_written_answers_busy_and_applies_nothing() -> None:
     fake = Fake()
     with working(fake) as pipeline:
@@ -137,7 +175,7 @@ def test_a_checkpoint_that_cannot_be_written_is_written_later() -> None:
 
 def test_a_round_is_written_in_slices_between_groups() -> None:
     fake = Fake()
-    with working(fake, checkpoint_every=30.0, slice=1) as pipeline:
+    with working(fake, checkpoint_every=5.0, slice=1) as pipeline:
         pipeline.submit([_item()]).result(30)
         wait_until(lambda: fake.rounds)
         pipeline.submit([_item()]).result(30)

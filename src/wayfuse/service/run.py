@@ -17,8 +17,8 @@ __all__ = ["serve"]
 
 _BACKLOG = 2048
 _GRACE_S = 5  # for requests under way, when the server is told to stop
-# allocations between looks for cycles: with the interpreter's own (700, 10, 10), which suit small programs, a fifth of
-# the time that requests take is spent on looking through sites and tracks, in which there are none
+# allocations between looks for cycles; with the interpreter's own (700, 10, 10), which suit small programs, requests
+# wait for looks through thousands of tracks, in which there are none
 _COLLECT_AFTER = (20_000, 20, 20)
 
 
