@@ -23,7 +23,7 @@ import numpy as np
 
 from wayfuse.core.errors import ConfigError
 from wayfuse.sensors.recording import Recording
-from wayfuse.sensors.records import Record
+from wayfuse.sensors.records import Record, Step
 from wayfuse.service.message import Message
 from wayfuse.service.phone_clock import ClockState, judge
 from wayfuse.service.stretch import RANK, START, Key, Keyed, gathered, joined, keyed
@@ -33,6 +33,7 @@ from wayfuse.tracking.tracker import Tracker, TrackState
 __all__ = ["LiveConfig", "LiveTrack", "Memory", "Snapshot"]
 
 _FAR = 1e12  # s; as the tracker judges
+_FIRST_EVENT = RANK[Step]  # below are the samples of motion sensors
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -78,6 +79,11 @@ class Memory(NamedTuple):
     is_ended: bool
 
 
+class _Stretch(NamedTuple):
+    n: int
+    records: Recording
+
+
 class LiveTrack:
     """A track under way; not for two threads at once."""
 
@@ -90,7 +96,8 @@ class LiveTrack:
         self._state = tracker.init(name, seed)
         self._verdicts: Counter[str] = Counter()
         self._last = START
-        self._stretches: list[Recording] = []  # since the oldest snapshot, cut where a state is kept
+        self._n_records = 0
+        self._stretches: list[_Stretch] = []  # since the oldest snapshot, cut where a state is kept
         self._snapshots = [Snapshot(START, 0, 0, {}, self._state)]
         self._first = 0  # number of the first estimate still here
         self._estimates: list[Estimate] = []
@@ -207,19 +214,19 @@ class LiveTrack:
         self.counts["clock set"] += 1
         state = self._tracker.init(f"{self.name}#{self._clock.epoch}", self.seed)
         n = self._first + len(self._estimates)
-        total = self._n_records()
         self._stretches, self._state, self._last = [], state, START
-        self._snapshots = [Snapshot(START, total, n, dict(self._verdicts), state)]
+        self._snapshots = [Snapshot(START, self._n_records, n, dict(self._verdicts), state)]
 
     def _rewind(self, fresh: list[Keyed]) -> tuple[int, list[Keyed]]:
         """Go back before the first of the records; the number of the first estimate undone, and what is to do again."""
         at = bisect_right(self._snapshots, fresh[0][0], key=itemgetter(0)) - 1
         back = self._snapshots[at]
         del self._snapshots[at + 1 :]
-        n, undone = self._n_records() - back.n_records, list[Recording]()
-        while n:
-            undone.insert(0, self._stretches.pop())
-            n -= undone[0].n_records
+        undone = list[Recording]()
+        while self._n_records > back.n_records:
+            n, records = self._stretches.pop()
+            undone.insert(0, records)
+            self._n_records -= n
         again = keyed(joined(undone).records())
         del self._estimates[back.n_estimates - self._first :]
         self.counts["rewinds"] += 1
@@ -251,22 +258,24 @@ class LiveTrack:
         if gaps:
             self._verdicts["gaps"] += gaps
         records = gathered(stretch)
-        self._state, said, scans, others = self._tracker.extend(self._state, records)
-        for verdict, n in (*scans.items(), *others.items()):
-            self._verdicts[verdict.value] += n
-        self._estimates += said
-        self._stretches.append(records)
+        if any(key[1] < _FIRST_EVENT for key, _ in stretch):
+            self._state, said, scans, others = self._tracker.extend(self._state, records)
+            self._estimates += said
+            for verdict, n in (*scans.items(), *others.items()):
+                self._verdicts[verdict.value] += n
+        else:  # of a few events, one by one: the same bits, without the work that pays for many samples
+            for _, record in stretch:
+                self._state, said, verdict = self._tracker.step(self._state, record)
+                self._estimates += said
+                self._verdicts[verdict.value] += 1
+        self._stretches.append(_Stretch(len(stretch), records))
+        self._n_records += len(stretch)
         self._last = stretch[-1][0]
-
-    def _n_records(self) -> int:
-        return self._snapshots[0].n_records + sum(r.n_records for r in self._stretches)
 
     def _mark(self) -> None:
         """Keep a way back here."""
         done = self._first + len(self._estimates)
-        self._snapshots.append(
-            Snapshot(self._last, self._n_records(), done, dict(self._verdicts), self._state)
-        )
+        self._snapshots.append(Snapshot(self._last, self._n_records, done, dict(self._verdicts), self._state))
 
     def _keep(self) -> None:
         """Keep a way back here, and give up those that are older than the bound."""
@@ -275,7 +284,7 @@ class LiveTrack:
         while len(self._snapshots) > 1 and self._snapshots[1].last[0] <= horizon:
             n = self._snapshots[1].n_records - self._snapshots.pop(0).n_records
             while n:
-                n -= self._stretches.pop(0).n_records
+                n -= self._stretches.pop(0).n
 
     # --- what outlives the process
 
@@ -286,7 +295,7 @@ class LiveTrack:
             self.seed,
             self._clock,
             self._snapshots[0],
-            joined(self._stretches),
+            joined([stretch.records for stretch in self._stretches]),
             tuple(s.n_records for s in self._snapshots[1:]),
             self._last_settled,
             dict(self.counts),
@@ -303,6 +312,7 @@ class LiveTrack:
         track._snapshots = [base]
         track._state, track._last = base.state, base.last
         track._verdicts = Counter(base.verdicts)
+        track._n_records = base.n_records
         track._first = base.n_estimates
         track._seen = dict.fromkeys(memory.seen)
         records = keyed(memory.records.records())

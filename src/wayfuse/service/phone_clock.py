@@ -48,12 +48,11 @@ def judge(state: ClockState, t: Array, arrived: float, rewind: float) -> Judged:
     """Take the times (n,) of a batch, finite, in any order. ``rewind`` : s, how late a record may be."""
     if not len(t):
         return Judged(state, np.ones(0, bool), False)
-    middle = float(np.median(t))
     if math.isnan(state.ahead):
-        state = state._replace(ahead=middle - arrived)
+        state = state._replace(ahead=_ahead(t, arrived))
     kept: BoolArray = t <= arrived + max(0.0, state.ahead) + TOLERANCE_S
     if not kept.any():  # all of them: the clock was set forward
-        state = ClockState(ahead=middle - arrived, epoch=state.epoch + 1)
+        state = ClockState(ahead=_ahead(t, arrived), epoch=state.epoch + 1)
         kept = t <= arrived + max(0.0, state.ahead) + TOLERANCE_S
         return Judged(state._replace(newest=float(t[kept].max())), kept, True)
     newest = float(t[kept].max())
@@ -64,6 +63,10 @@ def judge(state: ClockState, t: Array, arrived: float, rewind: float) -> Judged:
     state = state._replace(behind=state.behind + 1)
     phone, server = newest - state.behind_since[0], arrived - state.behind_since[1]
     if state.behind >= SUSTAINED and _IN_STEP[0] * server <= phone <= _IN_STEP[1] * server and phone > 0.0:
-        state = ClockState(ahead=middle - arrived, newest=newest, epoch=state.epoch + 1)
+        state = ClockState(ahead=_ahead(t, arrived), newest=newest, epoch=state.epoch + 1)
         return Judged(state, kept, True)
     return Judged(state, kept, False)
+
+
+def _ahead(t: Array, arrived: float) -> float:
+    return float(np.median(t)) - arrived

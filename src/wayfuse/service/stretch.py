@@ -42,6 +42,9 @@ _SERIES: Mapping[type, str] = MappingProxyType(
 _EVENTS: Mapping[type, str] = MappingProxyType(
     {Step: "steps", WifiScan: "wifi", BleReading: "ble", Range: "ranges", CsiFrame: "csi"}
 )
+_EMPTY: Mapping[str, Series] = MappingProxyType(
+    {name: attrgetter(name)(Recording(name="")) for name in _SERIES.values()}
+)
 # at equal times the order of `Recording.records`
 RANK: Mapping[type, int] = MappingProxyType({kind: n for n, kind in enumerate((*_SERIES, *_EVENTS))})
 
@@ -56,7 +59,7 @@ def gathered(records: Sequence[Keyed]) -> Recording:
     of: dict[type, list[Record]] = {}
     for _, record in records:
         of.setdefault(type(record), []).append(record)
-    columns: dict[str, object] = {}
+    columns: dict[str, object] = dict(_EMPTY)
     for kind, some in of.items():
         if kind in _SERIES:
             rows = np.array(some, np.float64)

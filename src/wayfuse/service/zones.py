@@ -17,7 +17,7 @@ import numpy as np
 
 from wayfuse.core.errors import ConfigError
 from wayfuse.core.types import Array
-from wayfuse.maps.areas import distance_to_area
+from wayfuse.maps.areas import Area, distance_to_area
 from wayfuse.maps.site import Site
 from wayfuse.tracking.estimate import Estimate, State
 
@@ -68,12 +68,12 @@ class Zones:
     def __init__(self, zones: Iterable[Zone], config: ZoneConfig | None = None) -> None:
         self.config = config or ZoneConfig()
         self._by_id = {zone.id: zone for zone in zones}
-        self._floors: dict[int, tuple[list[Zone], Array]] = {}
-        for zone in self._by_id.values():
-            self._floors.setdefault(zone.floor, ([], np.empty((0, 4))))[0].append(zone)
-        for floor, (some, _) in self._floors.items():
+        self._floors: dict[int, tuple[Array, list[tuple[str, Area]]]] = {}
+        for floor in {zone.floor for zone in self._by_id.values()}:
+            some = [zone for zone in self._by_id.values() if zone.floor == floor]
             boxes = [(*z.rings[0].min(axis=0), *z.rings[0].max(axis=0)) for z in some]
-            self._floors[floor] = (some, np.array(boxes, np.float64))
+            areas = [(z.id, Area.of(z.rings)) for z in some]
+            self._floors[floor] = (np.array(boxes, np.float64).T.copy(), areas)
 
     def __len__(self) -> int:
         return len(self._by_id)
@@ -135,11 +135,14 @@ class Zones:
 
     def _near(self, e: Estimate) -> dict[str, float]:
         """Distances (m) to the zones at hand, 0 inside."""
-        some, boxes = self._floors.get(e.floor, ([], np.empty((0, 4))))
-        margin = self.config.margin_m
-        near = (boxes[:, :2] <= (e.x + margin, e.y + margin)) & (boxes[:, 2:] >= (e.x - margin, e.y - margin))
-        place = np.array([e.x, e.y])
-        return {some[i].id: distance_to_area(some[i].rings, place) for i in np.flatnonzero(near.all(axis=1))}
+        found = self._floors.get(e.floor)
+        if found is None:
+            return {}
+        (left, bottom, right, top), areas = found
+        m = self.config.margin_m
+        near = (left <= e.x + m) & (bottom <= e.y + m) & (right >= e.x - m) & (top >= e.y - m)
+        at_hand = [areas[i] for i in near.nonzero()[0].tolist()]
+        return {name: area.distance(e.x, e.y) for name, area in at_hand}
 
 
 def rooms_of(site: Site) -> list[Zone]:
