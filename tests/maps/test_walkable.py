@@ -116,3 +116,16 @@ def test_a_floor_with_given_walls_keeps_only_those():
 def test_nominal_elevation():
     assert [nominal_elevation(level) for level in (-2, -1, 1, 2)] == [-9.0, -4.5, 0.0, 4.5]
     assert [nominal_elevation(level, has_ground=True) for level in (-1, 0, 1)] == [-4.5, 0.0, 4.5]
+
+
+def test_one_place_is_judged_as_many_are() -> None:
+    rng = np.random.default_rng(3)
+    mask = (rng.random((7, 11)) < 0.5).astype(np.uint8)
+    walkable = Walkable((-1.3, 2.1), 0.5, mask)
+    edges = [-1.3, -1.3 + 11 * 0.5, 2.1, 2.1 + 7 * 0.5, np.nan, np.inf, -np.inf, 1e300]
+    x = np.concatenate([rng.uniform(-3.0, 6.0, 500), edges, np.zeros(8)])
+    y = np.concatenate([rng.uniform(1.0, 7.0, 500), np.full(8, 3.0), edges])
+    with np.errstate(invalid="ignore"):
+        want = walkable.contains(x, y)
+    assert 50 < np.count_nonzero(want) < 400
+    assert [walkable.holds(*place) for place in zip(x.tolist(), y.tolist(), strict=True)] == want.tolist()

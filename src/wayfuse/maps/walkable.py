@@ -48,6 +48,12 @@ class Walkable:
         j = np.where(on, v, 0).astype(np.intp)
         return np.asarray(on & (self.mask[j, i] != 0))
 
+    def holds(self, x: float, y: float) -> bool:
+        """`contains` of one place, without the arrays that take most of its time."""
+        u, v = (x - self.origin[0]) / self.cell, (y - self.origin[1]) / self.cell
+        ny, nx = self.mask.shape
+        return 0.0 <= u < nx and 0.0 <= v < ny and bool(self.mask[int(v), int(u)])
+
     def centres(self) -> Array:
         """(n, 2) m, the centres of the walkable cells, row by row."""
         j, i = np.nonzero(self.mask)

@@ -73,7 +73,7 @@ def on_walkable(estimate: Estimate, cloud: Snapshot, walkable: tuple[Walkable, .
 
     A median of particles on both sides of an atrium lies in the atrium. Empty ``walkable`` = no map, nothing moves.
     """
-    if not walkable or bool(walkable[estimate.floor].contains(estimate.x, estimate.y)):
+    if not walkable or walkable[estimate.floor].holds(estimate.x, estimate.y):
         return estimate
     dx, dy = cloud.x - np.float32(estimate.x), cloud.y - np.float32(estimate.y)
     squared = np.where(cloud.floor == estimate.floor, dx * dx + dy * dy, np.inf)
