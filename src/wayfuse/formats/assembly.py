@@ -12,6 +12,7 @@ joins them and applies the rules that are the same for all formats, each with a 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from itertools import repeat
 
 import numpy as np
 
@@ -217,11 +218,14 @@ def _ble(columns: Mapping[str, Column]) -> tuple[BleReading, ...]:
     beacon = columns.get("beacon")
     if beacon is not None and len(ble.t):
         power = dict(zip(beacon.ids.tolist(), beacon.values[:, 1].tolist(), strict=True))
-        known = np.array([power.get(i, np.nan) for i in ble.ids.tolist()])
-        ble = ble._replace(values=np.column_stack([ble.values[:, 0], known]))
-        beacon = beacon.take(~np.isin(beacon.ids, ble.ids))
+        ids = ble.ids.tolist()
+        values = ble.values.copy()
+        values[:, 1] = list(map(power.get, ids, repeat(np.nan)))
+        ble, heard = ble._replace(values=values), set(ids)
+        beacon = None if heard.issuperset(power) else beacon.take(~np.isin(beacon.ids, ble.ids))
     if beacon is not None and len(beacon.t):
         ble = Column(*(np.concatenate(pair) for pair in zip(ble, beacon, strict=True)))
     column = _sorted("ble", ble, None)  # two paths deliver advertisements: their order is no fault
     rssi, power_dbm = column.values[:, 0].tolist(), column.values[:, 1].tolist()
-    return tuple(map(BleReading, column.t.tolist(), column.ids.tolist(), rssi, power_dbm))
+    rows = zip(column.t.tolist(), column.ids.tolist(), rssi, power_dbm, strict=True)
+    return tuple(map(tuple.__new__, repeat(BleReading), rows))  # as `_make` does, in compiled code alone
