@@ -159,11 +159,14 @@ def test_what_is_no_plan_is_refused_without_a_word_of_where_it_lay(plan_format: 
 
 def test_a_crash_between_two_moves_loses_no_site(world: Any, tmp_path: Path) -> None:
     kept = UploadedSites(tmp_path)
-    kept.save(world.site)
+    kept.write(world.site)
+    assert kept.folders() == []
+    kept.put(world.site.name)
     (place,) = kept.folders()
     place.rename(place.with_suffix(".old"))
     place.with_suffix(".new").mkdir()
     assert UploadedSites(tmp_path).folders() == [place]
-    kept.save(world.site)
+    kept.write(world.site)
+    kept.put(world.site.name)
     assert kept.folders() == [place]
     assert sorted(p.name for p in tmp_path.iterdir()) == [place.name]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable
 
 from wayfuse.core.errors import MapError
@@ -12,6 +13,8 @@ from wayfuse.service.server import Server
 from wayfuse.service.world import World
 
 __all__ = ["add_site", "remove_site"]
+
+_WRITING = threading.Lock()  # two sites of one name at once would be written into one place
 
 
 def add_site(server: Server, site: Site, actor: str, *, replace: bool = False) -> None:
@@ -34,7 +37,9 @@ def add_site(server: Server, site: Site, actor: str, *, replace: bool = False) -
                 remedy="give it another name",
             )
     world = server.world_of(site)
-    _between(server, lambda: _put(server, world))
+    with _WRITING:
+        server.uploads.write(site)  # all that takes long is done before the tracks wait
+        _between(server, lambda: _put(server, world))
     server.audit.add(server.clock(), actor, "import site", site.name)
 
 
@@ -62,7 +67,7 @@ def _put(server: Server, world: World) -> None:
     name = world.site.name
     if name in server.worlds:
         _check_empty(server, name)
-    server.uploads.save(world.site)
+    server.uploads.put(name)
     server.worlds[name] = world
 
 

@@ -121,22 +121,26 @@ class UploadedSites:
 
     def folders(self) -> list[Path]:
         """Folders of all sites."""
-        for old in self._folder.glob("*.old"):  # a crash came between the two moves of `save`
+        for old in self._folder.glob("*.old"):  # a crash came between the two moves of `put`
             place = old.with_suffix("")
             if not place.exists():
                 old.rename(place)
         return sorted(p for p in self._folder.glob("*") if not p.suffix)
 
-    def save(self, site: Site) -> None:
-        """Keep a site, instead of one of its name that was there."""
-        place = self._place(site.name)
-        new, old = place.with_suffix(".new"), place.with_suffix(".old")
-        for left in (new, old):
-            shutil.rmtree(left, ignore_errors=True)
+    def write(self, site: Site) -> None:
+        """Write a site beside its place, for `put`."""
+        new = self._place(site.name).with_suffix(".new")
+        shutil.rmtree(new, ignore_errors=True)
         site.save(new)
+
+    def put(self, name: str) -> None:
+        """Move a site that was written to its place, instead of one of its name that was there."""
+        place = self._place(name)
+        old = place.with_suffix(".old")
+        shutil.rmtree(old, ignore_errors=True)
         if place.exists():
             place.rename(old)
-        new.rename(place)
+        place.with_suffix(".new").rename(place)
         shutil.rmtree(old, ignore_errors=True)
 
     def remove(self, name: str) -> None:

@@ -187,10 +187,10 @@ class SurveyStore:
                     path.unlink()
 
     def _trim_scans(self, path: Path, before: float) -> None:
-        pushes = list(self.pushes(path.stem))
-        kept = [push for push in pushes if push.arrived >= before]
-        if len(kept) == len(pushes):
+        first = next(self.pushes(path.stem), None)
+        if first is not None and first.arrived >= before:  # they are in the order of their arrival
             return
+        kept = [push for push in self.pushes(path.stem) if push.arrived >= before]
         if not kept:
             path.unlink()
             self._phones.pop(path.stem, None)
