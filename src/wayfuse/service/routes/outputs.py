@@ -16,7 +16,7 @@ from wayfuse.service.live import Look, View
 from wayfuse.service.observations import write_observations
 from wayfuse.service.positions import collection, feature
 from wayfuse.service.problems import Problem, responses
-from wayfuse.service.routes.examples import POSITION
+from wayfuse.service.routes.answers import Position, Positions, Sites, Tracks, TrackSummary, answer
 from wayfuse.service.routes.sent_file import sent_file
 from wayfuse.service.server import Server
 from wayfuse.storage.tokens import Token
@@ -34,15 +34,12 @@ Site = Annotated[str, Query(max_length=200, description="Of this site alone.")]
 Time = Annotated[float | None, Query(description="s, of the phone's clock.", allow_inf_nan=False)]
 _MOST = 10_000
 _TRACK = re.compile("[0-9a-f]{16}")  # databases refuse some characters
-_FEATURES: dict[int | str, dict[str, Any]] = {
-    200: {"content": {"application/json": {"example": {"type": "FeatureCollection", "features": [POSITION]}}}}
-}
 _MEDIA = {"csv": "text/csv; charset=utf-8", "gpx": "application/gpx+xml", "mf-json": "application/geo+json"}
 _PARQUET = "application/vnd.apache.parquet"
 _WRITERS = {"gpx": to_gpx, "mf-json": to_mf_json}
 
 
-@router.get("/sites", summary="Sites that are served")
+@router.get("/sites", summary="Sites that are served", responses=answer(Sites), response_model=None)
 def sites(request: Request, token: Reader) -> dict[str, Any]:
     """Names, levels and versions of the radio maps."""
     server = server_of(request)
@@ -60,7 +57,7 @@ def sites(request: Request, token: Reader) -> dict[str, Any]:
     }
 
 
-@router.get("/positions", summary="Where everybody is", responses=_FEATURES)
+@router.get("/positions", summary="Where everybody is", responses=answer(Positions), response_model=None)
 def positions(request: Request, token: Reader, site: Site = "") -> dict[str, Any]:
     """GeoJSON of the latest position of every track in memory."""
     server = server_of(request)
@@ -69,7 +66,7 @@ def positions(request: Request, token: Reader, site: Site = "") -> dict[str, Any
     return {**collection(features), "seq": _applied(server)}
 
 
-@router.get("/tracks", summary="Tracks, the last heard first")
+@router.get("/tracks", summary="Tracks, the last heard first", responses=answer(Tracks), response_model=None)
 def tracks(
     request: Request,
     token: Reader,
@@ -88,7 +85,12 @@ def tracks(
     return {"tracks": [_summary(r, views.get(r.track), is_live=r.track in views) for r in newest]}
 
 
-@router.get("/tracks/{track}", summary="One track, with its counters", responses=responses(404))
+@router.get(
+    "/tracks/{track}",
+    summary="One track, with its counters",
+    responses=responses(404) | answer(TrackSummary),
+    response_model=None,
+)
 def track(request: Request, token: Reader, track: str) -> dict[str, Any]:
     """What is known of a track besides its places."""
     look = _look(server_of(request), token, track)
@@ -98,7 +100,8 @@ def track(request: Request, token: Reader, track: str) -> dict[str, Any]:
 @router.get(
     "/tracks/{track}/position",
     summary="Where somebody is",
-    responses=responses(404) | {200: {"content": {"application/json": {"example": POSITION}}}},
+    responses=responses(404) | answer(Position),
+    response_model=None,
 )
 def position(request: Request, token: Reader, track: str) -> dict[str, Any]:
     """GeoJSON of the latest position."""
@@ -109,7 +112,12 @@ def position(request: Request, token: Reader, track: str) -> dict[str, Any]:
     return found
 
 
-@router.get("/tracks/{track}/estimates", summary="Where somebody was", responses=responses(404) | _FEATURES)
+@router.get(
+    "/tracks/{track}/estimates",
+    summary="Where somebody was",
+    responses=responses(404) | answer(Positions),
+    response_model=None,
+)
 def estimates(
     request: Request,
     token: Reader,

@@ -8,6 +8,7 @@ from fastapi import APIRouter, Depends, Query, Request
 
 from wayfuse.service.access import SCHEME, allowed, server_of, site_of
 from wayfuse.service.problems import responses
+from wayfuse.service.routes.answers import Inside, answer
 from wayfuse.service.web.plan import zone_features
 from wayfuse.storage.tokens import Token
 
@@ -22,13 +23,6 @@ router = APIRouter(
 
 Reader = Annotated[Token, Depends(allowed("read"))]
 Site = Annotated[str, Query(max_length=200, description="Name of the site; not needed where there is one.")]
-_INSIDE: dict[int | str, dict[str, Any]] = {
-    200: {
-        "content": {
-            "application/json": {"example": {"site": "museum", "inside": {"F1/12": ["9f86d081884c7d65"]}}}
-        }
-    }
-}
 
 
 @router.get("", summary="Rooms and geofences")
@@ -39,7 +33,9 @@ def zones(request: Request, token: Reader, site: Site = "") -> dict[str, Any]:
     return zone_features(world.site, world.zones)
 
 
-@router.get("/inside", summary="Who is in which room or geofence", responses=_INSIDE)
+@router.get(
+    "/inside", summary="Who is in which room or geofence", responses=answer(Inside), response_model=None
+)
 def inside(request: Request, token: Reader, site: Site = "") -> dict[str, Any]:
     """Tracks by ``id`` of the zone; zones that nobody is in are left out, and so are tracks that have ended."""
     server = server_of(request)
