@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import time
+import zipfile
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -119,6 +120,8 @@ def test_floors_and_tabs_are_operated_from_the_keyboard(look: Callable[..., Any]
         assert page.page.is_visible(shown)
     assert not page.page.is_visible("#view-tracks")
     page.page.keyboard.press("End")
+    assert page.page.is_visible("#view-admin")
+    page.page.keyboard.press("ArrowLeft")
     assert page.page.is_visible("#view-survey")
 
 
@@ -168,7 +171,7 @@ def test_a_phones_screen_has_room_for_all_of_it(look: Callable[..., Any], served
     page = look(viewport={"width": 360, "height": 740}, has_touch=True)
     page.enter(served.token)
     wide = "() => document.documentElement.scrollWidth <= document.documentElement.clientWidth"
-    for tab in ("#tab-tracks", "#tab-zones", "#tab-replay", "#tab-survey"):
+    for tab in ("#tab-tracks", "#tab-zones", "#tab-replay", "#tab-survey", "#tab-admin"):
         page.page.click(tab)
         assert page.page.evaluate(wide)
         box = page.page.locator(tab).bounding_box()
@@ -211,6 +214,9 @@ def test_a_place_is_recorded_by_a_press_on_the_map(look: Callable[..., Any], ser
     page.page.wait_for_selector("#push-address:not([hidden])")
     address = page.page.input_value("#push-address").replace("sensor-logger?platform=android", "own")
     assert address.startswith(f"{served.address}/in/wf_")
+    page.page.select_option("#push-purpose", label="to be tracked alone")
+    page.page.click("text=Make a push address")
+    page.until(lambda: "/survey/" not in page.page.input_value("#push-address"))
 
     def push(number: int) -> None:
         t = time.time()
@@ -322,3 +328,56 @@ def test_a_building_is_imported_where_there_was_none(
         page.page.check("[value=coverage]")
         page.until(lambda: "0 fingerprints" in page.page.inner_text("#view-survey"))
         page.page.goto("about:blank")
+
+
+def test_who_may_only_read_sees_neither_survey_nor_administration(
+    look: Callable[..., Any], served: Any
+) -> None:
+    with served.client() as client:
+        token = client.post("/api/v1/tokens", json={"scopes": ["read"]}).json()["token"]
+    page = look()
+    page.enter(token)
+    assert page.page.is_visible("#tab-zones")
+    assert not page.page.is_visible("#tab-survey")
+    assert not page.page.is_visible("#tab-admin")
+    page.page.focus("#tab-tracks")
+    page.page.keyboard.press("End")
+    assert page.page.is_visible("#view-replay")
+
+
+def test_tokens_are_made_and_ended_and_a_phone_is_given_out_and_deleted(
+    look: Callable[..., Any], new_phone: Callable[[str], Any], served: Any, tmp_path: Path
+) -> None:
+    phone = new_phone("leaver")
+    phone.walk(8)
+    page = look()
+    page.enter(served.token)
+    page.page.click("#tab-admin")
+    page.page.fill("#token-label", "a screen in the hall")
+    page.page.click("text=Make a token")
+    page.page.wait_for_selector("#new-token:not([hidden])")
+    headers = {"Authorization": f"Bearer {page.page.input_value('#new-token')}"}
+    with served.client() as client:
+        assert client.get("/api/v1/token", headers=headers).json()["scopes"] == ["read"]
+    page.page.click("text=All tokens")
+    row = page.page.locator("tr", has_text="a screen in the hall")
+    row.get_by_role("button", name="End").click()
+    page.until(lambda: "ended" in row.inner_text())
+    page.page.fill("#phone-name", "leaver")
+    with page.page.expect_download() as saved:
+        page.page.click("text=Give out")
+    saved.value.save_as(tmp_path / "phone.zip")
+    with zipfile.ZipFile(tmp_path / "phone.zip") as archive:
+        assert f"tracks/{phone.track}.csv" in archive.namelist()
+    delete = page.page.get_by_role("button", name="Delete", exact=True)
+    delete.click()
+    page.until(lambda: "Say that you are sure" in page.page.inner_text("#view-admin"))
+    page.page.check("#phone-sure")
+    delete.click()
+    page.until(lambda: "1 tracks and 0 files" in page.page.inner_text("#view-admin"))
+    page.until(lambda: "forget device" in page.page.inner_text("#view-admin .deeds"))
+    with served.client() as client:
+        assert client.get(f"/api/v1/tracks/{phone.track}").status_code == 404
+    page.page.click("#tab-tracks")
+    page.page.click("#tab-admin")
+    assert not page.page.is_visible("#new-token")

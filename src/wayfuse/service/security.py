@@ -91,7 +91,7 @@ class Authority:
         self._known: OrderedDict[str, tuple[float, Token]] = OrderedDict()
 
     async def token(self, text: str, scope: str, site: str, client: str) -> Token:
-        """The token of a text, for a scope at a site.
+        """The token of a text, for a scope (empty: any) at a site.
 
         Raises
         ------
@@ -115,7 +115,7 @@ class Authority:
             raise Problem(
                 429, "too many requests", "send fewer, or larger ones", {"Retry-After": f"{wait:.0f}"}
             )
-        if not found.allows(scope, site):
+        if scope and not found.allows(scope, site):
             raise Problem(403, f"this token may not {scope} here", "ask the operator for one that may")
         return found
 

@@ -67,6 +67,12 @@ class Publication(BaseModel):
     version: Annotated[int, Field(ge=1, le=2**31 - 1)]
 
 
+@router.get("/token", summary="What the token of this request may do")
+def own_token(token: Annotated[Token, Depends(allowed(""))]) -> dict[str, Any]:
+    """For clients that show only what they can do; any token will do."""
+    return _token(token)
+
+
 @router.post("/tokens", status_code=201, summary="Make a token")
 def create_token(request: Request, maker: Surveyor, wanted: NewToken) -> dict[str, Any]:
     """The answer holds the token's text, which cannot be asked for again. Who surveys may make tokens with the scope

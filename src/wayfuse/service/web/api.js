@@ -36,6 +36,15 @@ export async function post(path, query, body) {
   return (await request(path, query, options)).json();
 }
 
+/** Save an answer as a file of a name. */
+export async function save(path, query, name) {
+  const link = document.createElement("a");
+  link.href = URL.createObjectURL(await (await request(path, query, {})).blob());
+  link.download = name;
+  link.click();
+  setTimeout(() => URL.revokeObjectURL(link.href), 60_000);
+}
+
 export const remove = async (path, query = {}) => (await request(path, query, { method: "DELETE" })).json();
 
 /** Events of a text stream, as they come: { id, event, data }. */

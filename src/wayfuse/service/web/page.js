@@ -1,5 +1,6 @@
 // The page: token, site, map, and the parts that share them.
 
+import { startAdmin } from "/web/admin.js";
 import { Refused, get, hasToken, keepToken, listen } from "/web/api.js";
 import { byId, el, notice } from "/web/dom.js";
 import { startDrawing } from "/web/draw.js";
@@ -78,7 +79,7 @@ async function start() {
     byId("tab-replay").click();
     return replay.replay(track);
   });
-  const parts = { "tab-zones": startZones(byId("view-zones"), map), "tab-replay": replay, "tab-survey": survey };
+  const parts = { "tab-zones": startZones(byId("view-zones"), map), "tab-replay": replay, "tab-survey": survey, "tab-admin": startAdmin(byId("view-admin")) };
   let before = "tab-tracks";
   startTabs(document.querySelector("[role=tablist]"), (tab) => {
     if (tab !== before) parts[before]?.left();
@@ -91,11 +92,15 @@ async function start() {
   });
   const sites = await enter();
   byId("leave").hidden = false;
+  const { scopes } = await get("/api/v1/token");
+  const may = (scope) => scopes.includes(scope) || scopes.includes("admin");
+  byId("tab-survey").hidden = !may("survey");
+  byId("tab-admin").hidden = !may("admin");
   startSites(sites);
   if (sites.length) await open(sites[0].name);
   else {
     notice("There is no building yet that this token may see. An administrator imports one under Survey.");
-    byId("tab-survey").click();
+    if (may("admin")) byId("tab-survey").click();
   }
 }
 

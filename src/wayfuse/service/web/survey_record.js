@@ -95,15 +95,16 @@ export function startRecord(map, changed, draw) {
 /** The address that a phone's app pushes to, with a token that may do nothing else. */
 function makeAddress() {
   const platform = el("select", { aria: { label: "Kind of phone" } }, el("option", { value: "android", textContent: "Android" }), el("option", { value: "ios", textContent: "iPhone" }));
+  const purpose = el("select", { id: "push-purpose", aria: { label: "What for" } }, el("option", { value: "/survey", textContent: "to survey" }), el("option", { value: "", textContent: "to be tracked alone" }));
   const address = el("input", { type: "text", readOnly: true, hidden: true, id: "push-address", aria: { label: "Push address" } });
   const make = action("Make a push address", async () => {
     const { token } = await post("/api/v1/tokens", {}, { scopes: ["ingest"], label: `phone, ${platform.value}`, site: store.site });
-    address.value = `${location.origin}/in/${token}/survey/sensor-logger?platform=${platform.value}`;
+    address.value = `${location.origin}/in/${token}${purpose.value}/sensor-logger?platform=${platform.value}`;
     address.hidden = false;
     address.focus();
     address.select();
     const isLocal = ["127.0.0.1", "localhost", "[::1]"].includes(location.hostname);
     return isLocal ? "Phones cannot reach this address: start the server with --host 0.0.0.0 and open the page by this machine's name." : "Paste it into Sensor Logger: Settings, Data Streaming, HTTP Push.";
   });
-  return el("details", {}, el("summary", { textContent: "Connect a phone (Sensor Logger)" }), el("div", { className: "choices" }, platform, make), address);
+  return el("details", {}, el("summary", { textContent: "Connect a phone (Sensor Logger)" }), el("div", { className: "choices" }, platform, purpose, make), address);
 }

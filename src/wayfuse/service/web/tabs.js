@@ -12,13 +12,15 @@ export function startTabs(list, chosen = () => {}) {
     if (focus) tab.focus();
     chosen(tab.id);
   };
-  for (const [n, tab] of tabs.entries()) {
+  for (const tab of tabs) {
     tab.addEventListener("click", () => choose(tab));
     tab.addEventListener("keydown", (event) => {
-      const to = { ArrowRight: n + 1, ArrowLeft: n - 1, Home: 0, End: tabs.length - 1 }[event.key];
+      const shown = tabs.filter((each) => !each.hidden);
+      const n = shown.indexOf(tab);
+      const to = { ArrowRight: n + 1, ArrowLeft: n - 1, Home: 0, End: shown.length - 1 }[event.key];
       if (to === undefined) return;
       event.preventDefault();
-      choose(tabs[(to + tabs.length) % tabs.length]);
+      choose(shown[(to + shown.length) % shown.length]);
     });
   }
 }
