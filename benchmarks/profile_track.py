@@ -20,6 +20,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from types import FrameType
 
+from wayfuse.cli.main import collect_seldom
 from wayfuse.evaluation.results_folds import build_tracker, gather
 from wayfuse.formats.datasets import data_root
 from wayfuse.formats.reading import read
@@ -100,6 +101,7 @@ def main(arguments: list[str] | None = None) -> Samples:
     parser.add_argument("--rounds", type=int, default=3)
     parser.add_argument("--out", type=Path)
     options = parser.parse_args(arguments)
+    collect_seldom()
     folds = gather(data_root() / "ms-indoor" / "site1", (1, 2))
     paths = [path for fold in (1, 2) for path in folds.paths[fold]][: options.walks]
     tracker = build_tracker("fused", folds.site, folds.surveys[1])

@@ -16,9 +16,9 @@ import click
 from wayfuse import __version__
 from wayfuse.core.errors import WayfuseError
 
-__all__ = ["LazyGroup", "cli", "main"]
+__all__ = ["LazyGroup", "cli", "collect_seldom", "main"]
 
-_YOUNG = 50_000  # objects made before the collector looks: imports make many and leave no garbage
+_YOUNG = 50_000  # objects made before the collector looks
 
 # name -> (module:attribute, the line that help shows)
 COMMANDS: dict[str, tuple[str, str]] = {
@@ -76,9 +76,14 @@ def cli() -> None:
     """Indoor tracking: Wi-Fi and phone motion sensors fused on floor plans."""
 
 
+def collect_seldom() -> None:
+    """Look for cycles of garbage seldom: imports, recordings and tracks make many objects and hardly a cycle."""
+    gc.set_threshold(_YOUNG)
+
+
 def main() -> None:
     """Run the command line; errors a user can mend are one line and exit status 2."""
-    gc.set_threshold(_YOUNG)
+    collect_seldom()
     atexit.register(gc.freeze)  # no last look through all that the compiler has made
     try:
         status = cli.main(prog_name="wayfuse", standalone_mode=False)
