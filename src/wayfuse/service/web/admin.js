@@ -4,7 +4,7 @@ import { get, post, remove, save } from "/web/api.js";
 import { action, ago, el } from "/web/dom.js";
 import { store } from "/web/store.js";
 
-const SCOPES = { read: "see the map", ingest: "send what phones send", survey: "survey", admin: "everything" };
+const SCOPES = { read: "see the map", ingest: "send what phones send", survey: "make and publish radio maps", admin: "everything" };
 const DEEDS = 100;
 
 export function startAdmin(view) {
