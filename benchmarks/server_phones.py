@@ -11,7 +11,7 @@ from __future__ import annotations
 import asyncio
 import re
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import cast
 
@@ -142,8 +142,13 @@ class Phones:
         self._draw = np.random.default_rng(seed)
         self.heard = Heard()
 
-    async def walk(self, host: str, port: int, token: str, seconds: float) -> tuple[float, float]:
-        """Send for so long; loop times of the first and last batch due. Then waits for what is under way."""
+    async def walk(
+        self, host: str, port: int, token: str, seconds: float, ready: Callable[[], None] = lambda: None
+    ) -> tuple[float, float]:
+        """Send for so long; loop times of the first and last batch due. Then waits for what is under way.
+
+        ``ready`` is called when all phones are connected, just before the first batch is due.
+        """
         loop = asyncio.get_running_loop()
         common = f"Host: {host}\r\nAuthorization: Bearer {token}\r\n"
         post = (
@@ -156,6 +161,7 @@ class Phones:
             for _ in range(self._n)
         ]
         await self._first(phones[0])
+        ready()
         start = loop.time() + 0.1
         tasks = [
             loop.create_task(self._one(n, phone, start, seconds, self._draw.random(2).tolist()))
