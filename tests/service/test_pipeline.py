@@ -8,7 +8,8 @@ import threading
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future
 from contextlib import contextmanager
-from typing import Any
+from types import SimpleNamespace
+from typing import Any, cast
 
 import pytest
 from service_running import wait_until
@@ -19,6 +20,8 @@ from wayfuse.service.events import Event, Hub
 from wayfuse.service.limits import RateLimit
 from wayfuse.service.message import Message
 from wayfuse.service.pipeline import BusyError, Item, Pipeline, PipelineConfig
+from wayfuse.service.routes.stream import _lines
+from wayfuse.service.server import Server
 from wayfuse.storage.log import Entry
 
 AWAY = OperationalError("statement", {}, Exception("away"))
@@ -322,3 +325,18 @@ def test_a_bucket_fills_with_time_and_is_of_one_key() -> None:
     limit.wait("d")  # "a" is forgotten
     assert limit.wait("a") == 0.0
     assert RateLimit(0.0, 1, lambda: 0.0).wait("a") == 0.0
+
+
+async def _quiet_until_mine(hub: Hub) -> bytes:
+    lines = _lines(cast("Server", SimpleNamespace(hub=hub)), "", "mine", 0, once=False)
+    told = asyncio.ensure_future(anext(lines))
+    for seq, track in ((1, "another's"), (2, "another's"), (3, "mine")):
+        for _ in range(5):
+            await asyncio.sleep(0.0)
+        assert not told.done()  # nothing, not even that the stream is alive
+        hub.publish([Event(seq, "s", track, b"{}")], seq)
+    return await told
+
+
+def test_a_stream_of_one_track_is_silent_about_others() -> None:
+    assert asyncio.run(_quiet_until_mine(Hub(10))) == b"id: 3\nevent: position\ndata: {}\n\n"

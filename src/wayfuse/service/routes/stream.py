@@ -74,8 +74,15 @@ async def _lines(
         yield f"id: {last}\nevent: snapshot\ndata: ".encode() + body + b"\n\n"
     if once and last >= hub.last:
         return
+    clock = asyncio.get_running_loop().time
+    spoke = clock()
     async for some in hub.after(last, _BEAT_S):
-        yield b"".join(_line(e) for e in some if _is_wanted(e, site, track)) or b": still here\n\n"
+        lines = b"".join(_line(e) for e in some if _is_wanted(e, site, track))
+        if (
+            lines or not some or clock() - spoke >= _BEAT_S
+        ):  # who asks for one track is not told of all others
+            spoke = clock()
+            yield lines or b": still here\n\n"
         if once and (not some or some[-1].id >= hub.last):
             return
 
