@@ -147,6 +147,30 @@ def test_a_scan_without_time_is_stamped_with_its_arrival() -> None:
         ADAPTERS["find3"].read(body[:-1] + b', "l": "kitchen"}', Profile(), 0.0)
 
 
+def test_whom_a_passive_scanner_heard_is_one_message_each_and_the_scanner_is_the_anchor() -> None:
+    fixed, other, drawn = "00:1b:63:00:00:01", "00:1b:63:00:00:02", "da:a1:19:00:00:01"
+    levels = {"wifi": {fixed: -40, drawn: -50, other: "loud"}, "bluetooth": {fixed: -70}, "smell": {fixed: 1}}
+    body = json.dumps({"d": "scanner-1", "f": "home", "t": 1763801000500, "s": levels}).encode()
+    first, second = ADAPTERS["find3-passive"].read(body, Profile(), 0.0)
+    assert (first.device, first.session, second.device) == (fixed, "home", other)
+    scan, heard = sorted(first.parts[0].records, key=lambda r: type(r).__name__, reverse=True)
+    assert isinstance(scan, WifiScan)
+    assert (scan.t, scan.bssid.tolist(), scan.rssi.tolist()) == (
+        1763801000.5,
+        [bssid_id("scanner-1")],
+        [-40.0],
+    )
+    assert (heard.id, heard.rssi) == (bssid_id("scanner-1"), -70.0)
+    assert first.notes == {"device with a random address": 1}
+    assert second.notes == {"wifi: not a level where one is due": 1}
+    assert drawn not in (first.body + second.body).decode()
+    assert other not in first.body.decode()
+    (again,) = ADAPTERS["find3-passive"].read(first.body, Profile(), 0.0)  # as the log is read
+    assert again.parts[0].key == first.parts[0].key
+    assert again.body == first.body
+    assert ADAPTERS["find3-passive"].read(b'{"d": "s", "s": {"wifi": {}}}', Profile(), 0.0) == []
+
+
 def test_an_anchor_s_frame_has_range_channel_and_the_target_s_motion() -> None:
     frame = {
         "target": "tag",

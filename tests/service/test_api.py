@@ -54,7 +54,7 @@ def test_clients_without_headers_have_the_token_in_the_address(app: Any, way: st
     path = f"/in/{app.tokens['ingest']}/{way}?platform=android"
     answer = app.client.post(path, json=EXAMPLES[adapter])
     assert answer.status_code == 200, answer.text
-    if adapter == "find3":
+    if adapter == "find3":  # the words that its clients wait for
         assert answer.json() == {"success": True, "message": "inserted data"}
     assert app.client.post(f"/in/wf_0_0/{way}", json=EXAMPLES[adapter]).status_code in {401, 429}
     assert app.client.post(f"/in/{app.tokens['read']}/{way}", json=EXAMPLES[adapter]).status_code == 403

@@ -35,7 +35,12 @@ def test_every_scope_is_documented(scope: str) -> None:
 
 @pytest.mark.parametrize("adapter", ADAPTERS)
 def test_every_way_in_is_documented(adapter: str) -> None:
-    words = {"find3": "FIND3", "espresense": "`espresense/", "intel5300": "`csi_port`"}
+    words = {
+        "find3": "FIND3",
+        "find3-passive": "`/passive`",
+        "espresense": "`espresense/",
+        "intel5300": "`csi_port`",
+    }
     assert re.search(words.get(adapter, rf"/in/(TOKEN/)?{adapter}"), PAGE)
 
 

@@ -1,4 +1,4 @@
-"""FIND3's ``/data`` and ``/passive``: one scan of a device, as a map of addresses to levels.
+"""FIND3's ``/data``: one scan of a device, as a map of addresses to levels.
 
 References
 ----------
@@ -19,12 +19,14 @@ from wayfuse.service.adapters.parts import digest_key, identifier, merged, notes
 from wayfuse.service.message import BadBodyError, Message, Part, Profile
 from wayfuse.service.wire import Name, check_count, decode
 
-__all__ = ["Find3"]
+__all__ = ["Data", "Find3", "take_level"]
 
 _RADIO = {"wifi": "wifi", "bluetooth": "ble"}
 
 
-class _Data(msgspec.Struct, frozen=True):
+class Data(msgspec.Struct, frozen=True):
+    """A body. d : device. f : family. t : ms. s : levels (dBm) by address, by sensor."""
+
     d: Name
     f: Annotated[str, msgspec.Meta(max_length=200)] = ""
     t: int | float = 0  # ms
@@ -37,7 +39,7 @@ class Find3:
 
     def read(self, body: bytes, profile: Profile, arrived: float) -> list[Message]:
         """One message per body; a scan without time is stamped with its arrival."""
-        data = decode(body, _Data)
+        data = decode(body, Data)
         check_count(sum(len(heard) for heard in data.s.values()))
         if data.l:
             raise BadBodyError(
@@ -50,14 +52,17 @@ class Find3:
             kind = _RADIO.get(sensor)
             for n, (name, raw) in enumerate(heard.items(), 1):
                 if kind is not None:
-                    _take(kind, name, raw, n, t, rows, report)
+                    take_level(kind, name, raw, n, t, rows, report)
         recording = assemble([Piece(rows.columns())], report, name="", clock="", one_stream=False)
         part = Part(digest_key(body), merged(recording.records()))
         session = profile.track or data.f
         return [Message(data.d, session, body, (part,), False, notes_of(report))]
 
 
-def _take(kind: str, name: str, raw: msgspec.Raw, n: int, t: float, rows: Rows, report: ReadReport) -> None:
+def take_level(
+    kind: str, name: str, raw: msgspec.Raw, n: int, t: float, rows: Rows, report: ReadReport
+) -> None:
+    """Add a level of an access point or beacon to the rows; one that is no number is counted instead."""
     try:
         level = msgspec.json.decode(raw, type=float)
     except (msgspec.DecodeError, UnicodeDecodeError, RecursionError):

@@ -168,7 +168,7 @@ _add("find3", "A scan as FIND3's clients send it")
 _add("getsensordata", "A GetSensorData log, whole")
 _add("anchors", "Frames of targets that an anchor overheard")
 
-_BY_PATH = {"sensor-logger": "sensor-logger", "data": "find3", "passive": "find3", "own": "own"}
+_BY_PATH = {"sensor-logger": "sensor-logger", "data": "find3", "passive": "find3-passive", "own": "own"}
 
 
 @router.post("/in/{token}/{way}", include_in_schema=False)
@@ -178,6 +178,6 @@ async def post_by_path(request: Request, token: str, way: str) -> Response:
         raise Problem(404, "no such way in", f"use one of {', '.join(_BY_PATH)}")
     adapter = _BY_PATH[way]
     answer = await _take(request, token, adapter)
-    if adapter == "find3" and answer.status_code == _OK:
+    if adapter.startswith("find3") and answer.status_code == _OK:
         return JSONResponse({"success": True, "message": "inserted data"})
     return answer
