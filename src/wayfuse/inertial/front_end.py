@@ -26,7 +26,16 @@ from wayfuse.inertial.step_length import DEFAULT, StepFeatures, StepLengthModel
 from wayfuse.sensors.recording import Recording, Series
 from wayfuse.sensors.records import Acceleration, MagneticField, Orientation, Record, RotationRate
 
-__all__ = ["FrontEndState", "InertialConfig", "InertialFrontEnd", "StepEvent", "StepEvents", "contiguous"]
+__all__ = [
+    "FrontEndState",
+    "InertialConfig",
+    "InertialFrontEnd",
+    "StepEvent",
+    "StepEvents",
+    "columns_within",
+    "contiguous",
+    "plain",
+]
 
 
 class StepEvent(NamedTuple):
@@ -157,9 +166,21 @@ _KIND = {
 def contiguous(recording: Recording, start: float = -np.inf, stop: float = np.inf) -> tuple[Array, ...]:
     """Times and values of the four motion series within start < t <= stop, as the kernels take them."""
     r = recording
-    parts: list[Array] = []
-    for series in (r.acceleration, r.rotation_rate, r.magnetic_field, r.orientation):
-        part: Series = series.between(start, stop)
-        # one memory layout, one compiled version: read-only and strided arrays are copied
-        parts += [np.require(column, np.float64, ("C", "W")) for column in (part.t, part.values)]
-    return tuple(parts)
+    series = r.acceleration, r.rotation_rate, r.magnetic_field, r.orientation
+    return tuple(columns_within(series, start, stop))
+
+
+def columns_within(series: tuple[Series, ...], start: float, stop: float) -> list[Array]:
+    """Times and values of each of several series in turn, within start < t <= stop, as the kernels take them."""
+    out: list[Array] = []
+    for one in series:
+        part = one.between(start, stop)
+        out += [plain(part.t), plain(part.values)]
+    return out
+
+
+def plain(column: Array) -> Array:
+    """One memory layout, one compiled version: read-only and strided arrays are copied."""
+    if column.flags.carray and column.dtype == np.float64:
+        return column
+    return np.require(column, np.float64, ("C", "W"))

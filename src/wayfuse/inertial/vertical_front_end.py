@@ -37,7 +37,7 @@ import numpy as np
 from wayfuse.core.types import Array
 from wayfuse.inertial import _vertical_kernels as kernels
 from wayfuse.inertial import _vertical_layout as at
-from wayfuse.inertial.front_end import StepEvent, StepEvents
+from wayfuse.inertial.front_end import StepEvent, StepEvents, columns_within, plain
 from wayfuse.inertial.vertical import Behaviour, VerticalEvent
 from wayfuse.inertial.vertical_config import VerticalConfig
 from wayfuse.sensors.recording import Recording
@@ -95,12 +95,10 @@ class VerticalFrontEnd:
     ) -> tuple[VerticalState, list[VerticalEvent]]:
         """Feed the records and steps with start < t <= stop; the same bits as one by one in time order."""
         memory = state.memory.copy()
-        columns: list[Array] = []
-        for series in (recording.acceleration, recording.rotation_rate, recording.pressure):
-            part = series.between(start, stop)
-            columns += [np.require(column, np.float64, ("C", "W")) for column in (part.t, part.values)]
-        i, j = np.searchsorted(steps.t, (start, stop), side="right")
-        feet = np.require(steps.t[i:j], np.float64, ("C", "W"))
+        r = recording
+        columns = columns_within((r.acceleration, r.rotation_rate, r.pressure), start, stop)
+        i, j = steps.t.searchsorted((start, stop), "right").tolist()
+        feet = plain(steps.t[i:j])
         rows = np.empty((len(columns[0]) + len(columns[2]) + len(columns[4]) + len(feet) + 1, at.N_EVENT))
         n = kernels.consume_series(memory, self._parameters, tuple(columns), feet, rows)
         return VerticalState(memory), [_event(row) for row in rows[:n]]

@@ -66,7 +66,7 @@ class Series:
 
     def between(self, start: float, stop: float) -> Series:
         """Samples with start < t <= stop (views)."""
-        i, j = np.searchsorted(self.t, (start, stop), side="right")
+        i, j = self.t.searchsorted((start, stop), "right").tolist()
         return Series(self.t[i:j], self.values[i:j])
 
 
