@@ -208,6 +208,26 @@ def test_a_forgotten_phone_leaves_nothing_but_empty_rows(engine: Engine) -> None
     ]
 
 
+@pytest.mark.parametrize("size", [100, 100_000])  # in a page of the table, and in pages of its own
+def test_what_is_forgotten_is_not_in_the_files_either(tmp_path: Path, size: int) -> None:
+    engine = open_database(f"sqlite:///{tmp_path / 'a.db'}")
+    store, log = TrackStore(engine), IngestLog(engine)
+    gone, kept = b"whose phone this is " * (size // 20), b"another's phone"
+    log.append([_entry(1, body=gone), _entry(2, device="d2", body=kept)])
+
+    def files() -> bytes:
+        return b"".join(path.read_bytes() for path in tmp_path.iterdir())
+
+    assert b"whose phone this is" in files()
+    store.forget("d1")
+    assert b"whose phone this is" not in files()
+    assert kept in files()
+    with engine.connect() as connection:
+        assert connection.execute(text("PRAGMA secure_delete")).scalar() == 0
+        assert connection.execute(text("PRAGMA busy_timeout")).scalar() == 10_000
+    engine.dispose()
+
+
 # --- tokens, devices, audit -------------------------------------------------------------------------------
 
 

@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 from sqlalchemy import Connection, Engine, Table, delete, func, insert, select, update
 from sqlalchemy.dialects import postgresql, sqlite
 
+from wayfuse.storage.erasing import erasing
 from wayfuse.storage.schema import checkpoints, counters, estimates, ingest_log, tracks
 from wayfuse.tracking.estimate import Estimate, State
 
@@ -142,8 +143,8 @@ class TrackStore:
             return int(connection.execute(delete(tracks).where(tracks.c.heard < heard_before)).rowcount)
 
     def forget(self, device: str) -> set[str]:
-        """Delete all of a phone, its part of the log too; which tracks it had."""
-        with self._engine.begin() as connection:
+        """Delete all of a phone, its part of the log too, from the files as well; which tracks it had."""
+        with erasing(self._engine) as connection:
             names = select(tracks.c.track).where(tracks.c.device == device)
             gone = set(connection.execute(names).scalars())
             connection.execute(delete(checkpoints).where(checkpoints.c.track.in_(names)))
