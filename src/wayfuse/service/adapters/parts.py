@@ -37,10 +37,9 @@ def identifier(text: str) -> int:
 
 def merged(records: Iterable[Record], more: Sequence[Record] = ()) -> tuple[Record, ...]:
     """Records in time order, without what a surveyor stated: truth is no input."""
-    ordered = sorted(more, key=attrgetter("t"))
-    if not records:
-        return tuple(ordered)
-    return tuple(r for r in heapq.merge(records, ordered, key=attrgetter("t")) if not isinstance(r, Waypoint))
+    if more:
+        records = heapq.merge(records, sorted(more, key=attrgetter("t")), key=attrgetter("t"))
+    return tuple(r for r in records if not isinstance(r, Waypoint))
 
 
 def notes_of(report: ReadReport) -> Mapping[str, int]:
