@@ -6,12 +6,15 @@ import csv
 import os
 import subprocess
 import sys
+from concurrent.futures import ThreadPoolExecutor
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
+from wayfuse.core.jit import _without
 from wayfuse.formats._kernels import mark_repeats
 
 WITHOUT_NUMBA = "import sys; sys.modules['numba'] = None; from wayfuse.cli.main import main; main()"
@@ -68,6 +71,18 @@ print(mass)
 def test_what_the_compiler_is_kept_from_can_be_loaded_afterwards() -> None:
     done = subprocess.run([sys.executable, "-c", AFTERWARDS], capture_output=True, text=True, check=False)
     assert done.stdout == "[0.5 0.5]\n", done.stderr[-3000:]
+
+
+def test_modules_are_left_out_for_the_thread_that_asks_only(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delitem(sys.modules, "colorsys", raising=False)
+    importers = list(sys.meta_path)
+    with _without("colorsys"):
+        with pytest.raises(ModuleNotFoundError, match="left out"):
+            import_module("colorsys")
+        with ThreadPoolExecutor(1) as pool:
+            found = pool.submit(import_module, "colorsys").result()
+        assert import_module("colorsys") is found  # what is loaded stays
+    assert sys.meta_path == importers
 
 
 def test_a_kernel_that_counts_no_references_leaves_those_of_its_arrays_alone() -> None:

@@ -14,6 +14,7 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from importlib import import_module
+from threading import get_ident
 from typing import Any, TypeVar, cast
 
 __all__ = [
@@ -29,22 +30,33 @@ __all__ = [
 F = TypeVar("F", bound=Callable[..., Any])
 
 
+class _LeftOut:
+    """An importer that finds no module of some names, for the thread that made it; others import what they like."""
+
+    def __init__(self, names: tuple[str, ...]) -> None:
+        self._names, self._thread = names, get_ident()
+
+    def find_spec(self, name: str, path: object = None, target: object = None) -> None:  # noqa: ARG002 (a protocol)
+        """Nothing, so that the next importer is asked; for the names an error, as where they are not installed."""
+        if name in self._names and get_ident() == self._thread:
+            raise ModuleNotFoundError(f"{name} is left out", name=name)
+
+
 @contextmanager
-def _absent(*names: str) -> Iterator[None]:
+def _without(*names: str) -> Iterator[None]:
     """Optional modules as if they were not installed, but for those that are loaded already."""
-    hidden = [name for name in names if name not in sys.modules]
-    sys.modules.update(dict.fromkeys(hidden))  # type: ignore[arg-type]  # an import of them then fails
+    finder = _LeftOut(names)
+    sys.meta_path = [finder, *sys.meta_path]  # a new list: another thread may be going through the old one
     try:
         yield
     finally:
-        for name in hidden:
-            del sys.modules[name]
+        sys.meta_path = [other for other in sys.meta_path if other is not finder]
 
 
 def _compiler() -> Any:
     try:
         # numba only asks whether coverage is measured (where it is, the module is loaded) and how old scipy is
-        with _absent("coverage", "scipy"):
+        with _without("coverage", "scipy"):
             import numba
     except ImportError:  # the same results, within rounding, at the speed of Python
         return None
@@ -63,7 +75,7 @@ def load_compiler() -> None:
     program that has the process to itself, before the first kernel.
     """
     if COMPILED:
-        with _absent("scipy", "scipy.linalg"):
+        with _without("scipy", "scipy.linalg"):
             import_module("numba.np.arraymath")
 
 
