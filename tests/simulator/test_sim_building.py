@@ -9,7 +9,7 @@ import shapely
 from wayfuse.core.errors import ConfigError
 from wayfuse.simulator.building import shopping_centre
 from wayfuse.simulator.geometry import clearance, crossings, inside, polygon_walls
-from wayfuse.simulator.routes import plan_route
+from wayfuse.simulator.routes import Manner, plan_route
 
 
 @pytest.mark.parametrize("seed", range(5))
@@ -90,7 +90,7 @@ def test_a_survey_passes_every_corridor():
 def test_routes_are_as_long_as_asked_and_stand_only_on_the_way():
     storey = shopping_centre(np.random.default_rng(0)).storeys[1]
     for seed in range(20):
-        route = plan_route(storey, 60.0, np.random.default_rng(seed), pause_share=1.0)
+        route = plan_route(storey, 60.0, np.random.default_rng(seed), manner=Manner(pause_share=1.0))
         assert 50.0 < np.hypot(*np.diff(route.xy, axis=0).T).sum() < 80.0
         assert route.pause[0] == route.pause[-1] == 0.0
         assert (route.pause[1:-1] >= 2.0).all()

@@ -24,6 +24,7 @@ from wayfuse.simulator.imu import ImuModel
 from wayfuse.simulator.passages import Activity
 from wayfuse.simulator.radio_field import RadioModel
 from wayfuse.simulator.round_trip import RangesModel
+from wayfuse.simulator.routes import Manner
 from wayfuse.simulator.scanner import ScannerModel
 from wayfuse.simulator.scenario_file import (
     ChangesPart,
@@ -355,6 +356,6 @@ def test_a_real_site_can_be_walked_in(ms_indoor):
     for k, (storey, floor) in enumerate(zip(building.storeys, site.floors, strict=True)):
         assert len(storey.nodes) > 50
         assert len(storey.rooms) > 20
-        way = errands(building, k, 80.0, rng, wander=0.0, pause_share=0.0)
+        way = errands(building, k, 80.0, rng, manner=Manner(0.0, 0.0))
         xy = np.array([way.start[:2], *[leg.stretch[:2] for leg in way.legs]]) + shift[k]
         assert floor.walkable.contains(*xy.T).all()

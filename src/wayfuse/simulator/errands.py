@@ -11,7 +11,7 @@ from wayfuse.core.types import IntArray
 from wayfuse.simulator.building import Building, Storey
 from wayfuse.simulator.journeys import Journey, shortest
 from wayfuse.simulator.passages import Activity, Stretch
-from wayfuse.simulator.routes import beside
+from wayfuse.simulator.routes import AT_EASE, Manner, beside
 from wayfuse.simulator.travel import Leg
 
 __all__ = ["errands"]
@@ -26,17 +26,14 @@ def errands(
     length: float,
     rng: np.random.Generator,
     *,
-    wander: float = 0.6,
-    pause_share: float = 0.15,
-    pause_range: tuple[float, float] = (2.0, 5.0),
+    manner: Manner = AT_EASE,
     visits: IntArray | None = None,
 ) -> Journey:
     """A walk of about ``length`` m on one floor.
 
     Parameters
     ----------
-    wander : how far beside a node one passes, m (largest, per axis).
-    pause_share, pause_range : share of way-points at which one stands, and for how long (s).
+    manner : how one walks.
     visits : (e,) counts per edge, updated in place; with them the goals least seen so far come first (a survey).
     """
     storey = building.storeys[floor]
@@ -52,13 +49,13 @@ def errands(
             nodes.append(node)
             if walked >= length:
                 break
-    place = beside(storey, nodes[0], None, wander, rng)
+    place = beside(storey, nodes[0], None, manner.wander, rng)
     start = (float(place[0]), float(place[1]), floor)
     legs = []
     for k, node in enumerate(nodes[1:]):
-        place = beside(storey, node, place, wander, rng)
-        stands = rng.random() < pause_share and k < len(nodes) - 2
-        pause = float(rng.uniform(*pause_range)) if stands else 0.0
+        place = beside(storey, node, place, manner.wander, rng)
+        stands = rng.random() < manner.pause_share and k < len(nodes) - 2
+        pause = float(rng.uniform(*manner.pause_range)) if stands else 0.0
         stretch = Stretch(float(place[0]), float(place[1]), Activity.WALKING)
         legs.append(Leg(stretch, pause, stated=floor, left=floor if stands else -1))
     return Journey(start, tuple(legs))

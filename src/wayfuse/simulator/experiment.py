@@ -27,6 +27,7 @@ from wayfuse.simulator.house_site import site_of
 from wayfuse.simulator.journeys import Journey, Trip, draw_trips, plan_journey, stay
 from wayfuse.simulator.radio_field import changed
 from wayfuse.simulator.round_trip import measure_ranges
+from wayfuse.simulator.routes import Manner
 from wayfuse.simulator.scenario import Scenario
 from wayfuse.simulator.scenario_file import ScenarioFile
 from wayfuse.simulator.simulate import SimulatedSite, site_in
@@ -167,9 +168,7 @@ def _numbers(scenario: ScenarioFile, role: str, phone: int) -> Scenario:
     low, high = np.add(scanner.device_offset_db, scenario.phone.models[phone].rss_offset_db).tolist()
     return Scenario(
         duration_s=survey.duration_s if role == "survey" else walkers.duration_s,
-        wander_m=walkers.wander_m,
-        pause_share=walkers.pause_share,
-        pause_s=walkers.pause_s,
+        manner=Manner(walkers.wander_m, walkers.pause_share, walkers.pause_s),
         stated_sigma=survey.stated_sigma,
         changes=walkers.changes,
         visit_m=walkers.visit_m,
@@ -246,9 +245,7 @@ def _stay(
         floor,
         numbers.way_length(person, rng),
         rng,
-        wander=numbers.wander_m,
-        pause_share=numbers.pause_share,
-        pause_range=numbers.pause_s,
+        manner=numbers.manner,
         visits=visits,
     )
 
@@ -262,9 +259,7 @@ def _journey(
         rng,
         lifts=numbers.lift,
         visit=numbers.visit_m,
-        wander=numbers.wander_m,
-        pause_share=numbers.pause_share,
-        pause_range=numbers.pause_s,
+        manner=numbers.manner,
     )
 
 

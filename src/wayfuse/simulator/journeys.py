@@ -16,7 +16,7 @@ from wayfuse.core.types import Array, IntArray
 from wayfuse.simulator.building import Building, Storey
 from wayfuse.simulator.passages import Activity, Passage, Stretch
 from wayfuse.simulator.rides import LiftModel
-from wayfuse.simulator.routes import beside, plan_route
+from wayfuse.simulator.routes import AT_EASE, Manner, beside, plan_route
 from wayfuse.simulator.travel import Leg
 
 __all__ = [
@@ -105,21 +105,18 @@ def plan_journey(
     *,
     lifts: LiftModel,
     visit: tuple[float, float] = (14.0, 34.0),
-    wander: float = 0.6,
-    pause_share: float = 0.15,
-    pause_range: tuple[float, float] = (2.0, 5.0),
+    manner: Manner = AT_EASE,
 ) -> Journey:
     """A journey from a place on floor ``start`` through the trips, and on to a place on the last floor.
 
     Parameters
     ----------
     visit : shortest and longest way on each floor, m, where the floor has one.
-    wander : how far beside a node one passes, m (largest, per axis).
-    pause_share, pause_range : share of inner way-points at which one stands, and for how long (s).
+    manner : how one walks.
     """
     storey = building.storeys[start]
     node = int(rng.choice(_inner(building, start)))
-    place = beside(storey, node, None, wander, rng)
+    place = beside(storey, node, None, manner.wander, rng)
     origin = (float(place[0]), float(place[1]), start)
     legs: list[Leg] = []
     floor = start
@@ -127,8 +124,10 @@ def plan_journey(
         passage = None if trip is None else building.passages[trip.passage]
         goal = None if passage is None else landing_node(building, floor, passage)
         ways = _wander(building, floor, node, goal, visit, rng)
-        legs += _level_legs(building.storeys[floor], floor, ways, place, wander, passage is not None, rng)
-        _pause(legs, len(ways) - 1, pause_share, pause_range, rng)
+        legs += _level_legs(
+            building.storeys[floor], floor, ways, place, manner.wander, passage is not None, rng
+        )
+        _pause(legs, len(ways) - 1, manner, rng)
         if trip is None or passage is None:
             break
         legs += through(passage, trip, floor, legs, lifts, rng)
@@ -230,13 +229,11 @@ def _level_legs(
     return legs
 
 
-def _pause(
-    legs: list[Leg], n: int, share: float, span: tuple[float, float], rng: np.random.Generator
-) -> None:
+def _pause(legs: list[Leg], n: int, manner: Manner, rng: np.random.Generator) -> None:
     """Stand at some of the last legs' ends but the very last."""
     for k in range(max(len(legs) - n - 1, 0), len(legs) - 1):
-        if legs[k].passage < 0 and rng.random() < share:
-            legs[k] = legs[k]._replace(pause=float(rng.uniform(*span)), left=legs[k].stated)
+        if legs[k].passage < 0 and rng.random() < manner.pause_share:
+            legs[k] = legs[k]._replace(pause=float(rng.uniform(*manner.pause_range)), left=legs[k].stated)
 
 
 def through(
@@ -269,21 +266,11 @@ def stay(
     length: float,
     rng: np.random.Generator,
     *,
-    wander: float = 0.6,
-    pause_share: float = 0.15,
-    pause_range: tuple[float, float] = (2.0, 5.0),
+    manner: Manner = AT_EASE,
     visits: IntArray | None = None,
 ) -> Journey:
     """A walk of about ``length`` m on one floor; parameters as of `wayfuse.simulator.routes.plan_route`."""
-    route = plan_route(
-        building.storeys[floor],
-        length,
-        rng,
-        wander=wander,
-        pause_share=pause_share,
-        pause_range=pause_range,
-        visits=visits,
-    )
+    route = plan_route(building.storeys[floor], length, rng, manner=manner, visits=visits)
     places, pauses = route.xy.tolist(), route.pause.tolist()
     legs = tuple(
         Leg(Stretch(x, y, Activity.WALKING), pause, stated=floor, left=floor if pause else -1)

@@ -7,15 +7,27 @@ in a dead end. Each node is passed a little beside its place, as far as the wall
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from wayfuse.core.types import Array, IntArray
 from wayfuse.simulator.building import Storey
 
-__all__ = ["Route", "beside", "plan_route"]
+__all__ = ["AT_EASE", "Manner", "Route", "beside", "plan_route"]
 
 _MARGIN = 0.7  # m from the walls: half a shoulder and what a rounded turn cuts off
+
+
+class Manner(NamedTuple):
+    """How one walks."""
+
+    wander: float = 0.6  # m, how far beside a node one passes, at most, per axis
+    pause_share: float = 0.15  # of inner nodes at which one stands
+    pause_range: tuple[float, float] = (2.0, 5.0)  # s, how long
+
+
+AT_EASE = Manner()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -31,25 +43,22 @@ def plan_route(
     length: float,
     rng: np.random.Generator,
     *,
-    wander: float = 0.6,
-    pause_share: float = 0.15,
-    pause_range: tuple[float, float] = (2.0, 5.0),
+    manner: Manner = AT_EASE,
     visits: IntArray | None = None,
 ) -> Route:
     """Draw a route of about ``length`` m.
 
     Parameters
     ----------
-    wander : how far beside a node one passes, m (largest, per axis).
-    pause_share, pause_range : share of inner way-points at which one stands, and for how long (s).
+    manner : how one walks.
     visits : (e,) counts per edge, updated in place; with them the least walked edges come first (a survey).
     """
     nodes = _node_sequence(storey, length, rng, visits)
-    places = [beside(storey, nodes[0], None, wander, rng)]
+    places = [beside(storey, nodes[0], None, manner.wander, rng)]
     for node in nodes[1:]:
-        places.append(beside(storey, node, places[-1], wander, rng))
+        places.append(beside(storey, node, places[-1], manner.wander, rng))
     xy = np.array(places)
-    pause = np.where(rng.random(len(xy)) < pause_share, rng.uniform(*pause_range, len(xy)), 0.0)
+    pause = np.where(rng.random(len(xy)) < manner.pause_share, rng.uniform(*manner.pause_range, len(xy)), 0.0)
     pause[0] = pause[-1] = 0.0
     return Route(xy, pause)
 

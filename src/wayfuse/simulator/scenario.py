@@ -15,6 +15,7 @@ from wayfuse.simulator.barometer import BarometerModel
 from wayfuse.simulator.imu import ImuModel
 from wayfuse.simulator.radio_field import RadioModel
 from wayfuse.simulator.rides import LiftModel
+from wayfuse.simulator.routes import Manner
 from wayfuse.simulator.scanner import ScannerModel
 from wayfuse.simulator.walker import Person, WalkerModel
 
@@ -31,9 +32,7 @@ class Scenario:
         40.0,
         60.0,
     )  # walks of the public recordings: median 30 s, longest 119 s
-    wander_m: float = 0.6  # how far beside a corridor's way-point people pass
-    pause_share: float = 0.12  # of inner way-points at which they stand
-    pause_s: tuple[float, float] = (2.0, 5.0)
+    manner: Manner = field(default_factory=lambda: Manner(pause_share=0.12))
     stated_sigma: float = 0.1  # m, how well a surveyor states where he is
     changes: int = 2  # of floors on a walk to track, where there are stairs or lifts
     visit_m: tuple[float, float] = (14.0, 34.0)  # shortest and longest way on each of its floors

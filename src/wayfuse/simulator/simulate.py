@@ -111,9 +111,7 @@ def simulate_walk(
         storey,
         scenario.way_length(person, rng),
         rng,
-        wander=scenario.wander_m,
-        pause_share=scenario.pause_share,
-        pause_range=scenario.pause_s,
+        manner=scenario.manner,
         visits=visits,
     )
     truth_walk = walk(route, person, scenario.walker, rng)

@@ -124,9 +124,7 @@ def simulate_journey(
         rng,
         lifts=scenario.lift,
         visit=scenario.visit_m,
-        wander=scenario.wander_m,
-        pause_share=scenario.pause_share,
-        pause_range=scenario.pause_s,
+        manner=scenario.manner,
     )
     person = draw_person(scenario.walker, rng)
     w = go(site, scenario, rng, journey, person)
@@ -150,9 +148,7 @@ def simulate_stay(
         floor,
         scenario.way_length(person, rng),
         rng,
-        wander=scenario.wander_m,
-        pause_share=scenario.pause_share,
-        pause_range=scenario.pause_s,
+        manner=scenario.manner,
         visits=visits,
     )
     w = go(site, scenario, rng, journey, person)
