@@ -26,6 +26,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "survey": ("wayfuse.cli.survey:survey", "Build radio maps from recordings with waypoints."),
     "track": ("wayfuse.cli.track:track", "Track recordings through a site."),
     "serve": ("wayfuse.cli.serve:serve", "Serve live positions: phones and anchors in, positions out."),
+    "send": ("wayfuse.cli.send:send", "Send recordings to a server, as phones would."),
     "evaluate": ("wayfuse.cli.evaluate:evaluate", "Score estimates against the waypoints of recordings."),
     "datasets": ("wayfuse.cli.datasets:datasets", "List, fetch and verify public data sets."),
     "inspect": ("wayfuse.cli.inspect:inspect", "Say what a recording holds and what was wrong with it."),
