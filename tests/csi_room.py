@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
 import numpy as np
 
+from wayfuse.core.types import Array
 from wayfuse.maps.site import Site
 from wayfuse.models.channel_survey import anchor_distances
 from wayfuse.papers.li2015_channel import room_places
 from wayfuse.radio.ap_places import ApPlaces, write_ap_places
 from wayfuse.radio.channel_model import ChannelModel, fit_channel_model
+from wayfuse.sensors.records import CsiFrame
 from wayfuse.simulator.experiment import SimulatedWalk, make_world, plan_walks, simulate_plan
 from wayfuse.simulator.scenario_file import find_scenario, load_scenario_file
 
@@ -21,13 +24,17 @@ __all__ = ["Room", "make_room"]
 
 @dataclass(frozen=True)
 class Room:
-    """What was made. survey : its first walk."""
+    """What was made. survey : the walks that the model was fitted to."""
 
     site: Site
     places: ApPlaces
     model: ChannelModel
-    survey: SimulatedWalk
+    survey: tuple[SimulatedWalk, ...]
     walks: tuple[SimulatedWalk, ...]
+
+    def surveyed(self) -> tuple[list[CsiFrame], Array]:
+        """All frames of the survey, and how far their anchors were."""
+        return _surveyed(self.site, self.survey, self.places)
 
     def save(self, folder: Path) -> Path:
         """The site's folder as a server takes it, with its anchors."""
@@ -45,7 +52,11 @@ def make_room() -> Room:
     plans = plan_walks(world)
     survey = [simulate_plan(world, p) for p in plans if p.role == "survey"][:4]
     walks = [simulate_plan(world, p) for p in plans if p.role == "walk"][:2]
-    frames = [frame for made in survey for frame in made.recording.csi]
-    places = room_places(world, sorted({frame.anchor for frame in frames}))
-    distances = np.concatenate([anchor_distances(site, made.recording, places) for made in survey])
-    return Room(site, places, fit_channel_model(frames, distances, site.name), survey[0], tuple(walks))
+    places = room_places(world, sorted({frame.anchor for made in survey for frame in made.recording.csi}))
+    model = fit_channel_model(*_surveyed(site, survey, places), site.name)
+    return Room(site, places, model, tuple(survey), tuple(walks))
+
+
+def _surveyed(site: Site, survey: Sequence[SimulatedWalk], places: ApPlaces) -> tuple[list[CsiFrame], Array]:
+    distances = [anchor_distances(site, made.recording, places) for made in survey]
+    return [frame for made in survey for frame in made.recording.csi], np.concatenate(distances)

@@ -2,50 +2,26 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from csi_room import Room, make_room
 from wayfuse.core.errors import RadioMapError
 from wayfuse.core.types import Array
-from wayfuse.maps.site import Site
-from wayfuse.models.channel_survey import anchor_distances
-from wayfuse.papers.li2015_channel import room_places
 from wayfuse.presets.li2015 import Config
 from wayfuse.presets.li2015_tracker import build
-from wayfuse.radio.ap_places import ApPlaces
 from wayfuse.radio.csi_survey import channel_ranges, fit_anchors
 from wayfuse.radio.packet_groups import PacketGrouper
 from wayfuse.sensors.recording import Recording
-from wayfuse.sensors.records import CsiFrame
-from wayfuse.simulator.experiment import SimulatedWalk, make_world, plan_walks, simulate_plan
-from wayfuse.simulator.scenario_file import find_scenario, load_scenario_file
+from wayfuse.simulator.experiment import SimulatedWalk
 from wayfuse.tracking.estimate import State
-
-
-@dataclass(frozen=True)
-class Room:
-    site: Site
-    places: ApPlaces
-    survey: tuple[SimulatedWalk, ...]
-    walks: tuple[SimulatedWalk, ...]
-
-    def surveyed(self) -> tuple[list[CsiFrame], Array]:
-        frames = [frame for made in self.survey for frame in made.recording.csi]
-        recordings = [made.recording for made in self.survey]
-        return frames, np.concatenate([anchor_distances(self.site, r, self.places) for r in recordings])
 
 
 @pytest.fixture(scope="module")
 def room() -> Room:
-    path = find_scenario("csi-room")
-    site, world = make_world(load_scenario_file(path), 0, path.parent)
-    plans = plan_walks(world)
-    made = [simulate_plan(world, p) for p in plans if p.role == "survey"][:4]
-    walks = [simulate_plan(world, p) for p in plans if p.role == "walk"][:2]
-    anchors = sorted({f.anchor for m in made for f in m.recording.csi})
-    return Room(site, room_places(world, anchors), tuple(made), tuple(walks))
+    return make_room()
 
 
 GROUPER = {"wait": 0.2, "window": 0.125}  # four packets a second

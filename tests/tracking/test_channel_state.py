@@ -98,11 +98,12 @@ def test_without_a_model_channel_state_is_not_looked_at(room: Room) -> None:
 
 
 def test_distances_of_a_survey_are_those_of_the_walk(room: Room) -> None:
-    recording = room.survey.recording
+    surveyed = room.survey[0]
+    recording = surveyed.recording
     distances = anchor_distances(room.site, recording, room.places)
     t = np.array([frame.t for frame in recording.csi])
     rows = room.places.rows(np.array([frame.anchor for frame in recording.csi], np.uint64))
-    true = np.hypot(*(room.survey.truth.at(t)[:, :2] - room.places.xy[rows]).T)
+    true = np.hypot(*(surveyed.truth.at(t)[:, :2] - room.places.xy[rows]).T)
     known = np.isfinite(distances)
     assert known.mean() > 0.8
     assert np.median(np.abs(distances - true)[known]) < 0.5
