@@ -41,7 +41,10 @@ def accumulate_overlap(
 def nearest_by_overlap(
     overlap: Array32, row_sum: Array32, query_sum: np.float32, k: int, index: NDArray[np.int32], best: Array32
 ) -> int:
-    """`nearest` of the Sorensen distances 1 - 2 overlap / (row_sum + query_sum + 1e-6), rounded as by NumPy."""
+    """Write the k smallest Sorensen distances, ascending, and their rows; ties keep the lower row. Returns how many.
+
+    A distance is 1 - 2 overlap / (row_sum + query_sum + 1e-6), rounded as by NumPy.
+    """
     distance = np.empty(_BLOCK, np.float32)
     n = 0
     for start in range(0, overlap.shape[0], _BLOCK):
