@@ -58,17 +58,24 @@ def batch_of(cloud: Array, tracks: int = 1) -> TrackBatch:
 
 
 class OurFilter:
-    """One track, ticked with ranges or with readings ("levels")."""
+    """One track, ticked with ranges or with readings ("levels"); what it takes is written into arrays of its own."""
 
     def __init__(self, model: BatchModel, batch: TrackBatch, kind: str):
         self.model, self.batch, self.kind = model, batch, kind
-        self.track = np.zeros(1, np.int64)
+        self.track, self.step = np.zeros(1, np.int64), np.empty((1, 2), np.float32)
+        self.ranges = np.empty((1, len(model.anchors)), np.float32)
+        self.seen = Seen(ranges=self.ranges)
         self.resampled = 0
 
     def update(self, moment: Moment) -> Array:
         """One step and one observation; the mean place (2,)."""
-        seen = Seen(ranges=moment.ranges[None]) if self.kind == "ranges" else Seen(scans=moment.scan[None])
-        out = self.model.tick(self.batch, self.track, np.array([moment[:2]]), seen)[0]
+        seen = self.seen
+        if self.kind == "ranges":
+            self.ranges[0] = moment.ranges
+        else:
+            seen = Seen(scans=moment.scan[None])
+        self.step[0, 0], self.step[0, 1] = moment[0], moment[1]
+        out = self.model.tick(self.batch, self.track, self.step, seen)[0]
         self.resampled += int(out[7])
         return out[:2]
 

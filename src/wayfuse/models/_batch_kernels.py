@@ -44,7 +44,7 @@ def tick(
 ) -> int:
     """Advance some tracks of a batch by one step and one observation each, in place.
 
-    Returns -1, or the first k that names a track outside the batch, one already named, or a step that is not finite;
+    Returns -1, or a k that names a track outside the batch, one already named, or a step that is not finite;
     nothing is changed then.
 
     particles (U, 4, N), log_weights (U, N), counters (U, 3): key, key, draws so far. tracks (K,): the rows to advance.
@@ -59,9 +59,15 @@ def tick(
     if wrong >= 0:
         return wrong
     n = particles.shape[2]
-    words, z, block = np.empty((4, n), np.uint32), np.empty((4, n), np.float32), np.empty((4, n), np.float32)
-    weights, hit, marks = np.empty(n, np.float32), np.empty(n, np.bool_), np.empty(n + 1, np.int32)
-    one = np.empty((4, 1), np.uint32)
+    # few allocations: for a single track they would take as long as a pass
+    random, scratch = np.empty(4 * n, np.uint32), np.empty(9 * n, np.float32)
+    words, one = random.reshape((4, n)), random[:4].reshape((4, 1))
+    z, block, weights = (
+        scratch[: 4 * n].reshape((4, n)),
+        scratch[4 * n : 8 * n].reshape((4, n)),
+        scratch[8 * n :],
+    )
+    hit, marks = np.empty(n, np.bool_), np.empty(n + 1, np.int32)
     for k in range(len(tracks)):
         u = tracks[k]
         old, logs = particles[u], log_weights[u]
@@ -99,15 +105,16 @@ def tick(
 
 @kernel
 def _first_wrong(tracks: NDArray[np.int64], steps: Array32, n_tracks: int) -> int:
-    named = np.zeros(n_tracks if len(tracks) > 1 else 1, np.bool_)
     for k in range(len(tracks)):
         u = tracks[k]
         if u < 0 or u >= n_tracks or not (np.isfinite(steps[k, 0]) and np.isfinite(steps[k, 1])):
             return k
-        if len(tracks) > 1:
-            if named[u]:
+    if len(tracks) > 1:
+        named = np.zeros(n_tracks, np.bool_)
+        for k in range(len(tracks)):
+            if named[tracks[k]]:
                 return k
-            named[u] = True
+            named[tracks[k]] = True
     return -1
 
 

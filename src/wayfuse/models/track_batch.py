@@ -160,10 +160,12 @@ class TrackBatch:
 
 
 def _of_tracks(values: NDArray[np.floating], shape: tuple[int | None, ...], name: str) -> Array32:
-    if len(values.shape) != len(shape) or any(
-        w not in {None, g} for g, w in zip(values.shape, shape, strict=True)
-    ):
-        raise UsageError(f"{name} of shape {values.shape}", remedy=f"{shape}, None = any")
+    got = values.shape
+    wanted = (
+        shape if None not in shape else tuple(g if w is None else w for g, w in zip(got, shape, strict=False))
+    )
+    if len(got) != len(shape) or got != wanted:
+        raise UsageError(f"{name} of shape {got}", remedy=f"{shape}, None = any")
     return np.ascontiguousarray(values, dtype=np.float32)
 
 

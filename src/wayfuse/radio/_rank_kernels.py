@@ -29,6 +29,27 @@ def _bits_of_bytes(word: np.uint64) -> np.uint64:
 
 
 @kernel
+def _take_opposites(
+    one: NDArray[np.uint64], two: NDArray[np.uint64], ahead: NDArray[np.uint64], counts: NDArray[np.int64]
+) -> None:
+    """Take 2 from ``counts`` (m,) for each pair that a place has the other way round; four words in a pass."""
+    words, m = ahead.shape
+    fours = words - words % 4
+    for w in range(0, fours, 4):
+        a, b, c, d = one[w], one[w + 1], one[w + 2], one[w + 3]
+        e, f, g, h = a | two[w], b | two[w + 1], c | two[w + 2], d | two[w + 3]
+        p, q, r, s = ahead[w], ahead[w + 1], ahead[w + 2], ahead[w + 3]
+        for k in range(m):
+            first = _ones((a ^ p[k]) & e) + _ones((b ^ q[k]) & f)
+            last = _ones((c ^ r[k]) & g) + _ones((d ^ s[k]) & h)
+            counts[k] -= np.int64(2) * np.int64(first + last)
+    for w in range(fours, words):
+        a, e, p = one[w], one[w] | two[w], ahead[w]
+        for k in range(m):
+            counts[k] -= np.int64(2) * np.int64(_ones((a ^ p[k]) & e))
+
+
+@kernel
 def tau_of_places(
     keys: NDArray[np.floating],
     sign: float,
@@ -51,7 +72,8 @@ def tau_of_places(
     sorted_last = np.empty(n)
     for i in range(n):
         sorted_last[i] = np.inf if np.isnan(keys[i]) else sign * keys[i]
-    less, more = np.zeros(64 * words, np.uint8), np.zeros(64 * words, np.uint8)
+    less_more = np.zeros((2, 64 * words), np.uint8)
+    less, more = less_more[0], less_more[1]
     pair = 0
     for i in range(n - 1):
         key, others = sorted_last[i], sorted_last[i + 1 :]
@@ -60,29 +82,28 @@ def tau_of_places(
             less_here[j] = np.uint8(key < others[j])
             more_here[j] = np.uint8(key > others[j])
         pair += len(others)
-    one, two = np.zeros(words, np.uint64), np.zeros(words, np.uint64)
+    bits = np.zeros((2, words), np.uint64)
+    one, two = bits[0], bits[1]
     less_eight, more_eight = less.view(np.uint64), more.view(np.uint64)
     for w in range(words):
         for p in range(8):
             one[w] |= _bits_of_bytes(less_eight[8 * w + p]) << np.uint64(8 * p)
             two[w] |= _bits_of_bytes(more_eight[8 * w + p]) << np.uint64(8 * p)
-    counts = np.zeros(m, np.int64)
     used = np.int64(0)
     for w in range(words):
-        a, b = one[w], two[w]
-        told = a | b
-        n_told = np.int64(_ones(told))
-        used += n_told
-        place_ahead = ahead[w]
-        if len(behind) == 0:
+        used += np.int64(_ones(one[w] | two[w]))
+    counts = np.empty(m, np.int64)
+    if len(behind) == 0:
+        counts[:] = used
+        _take_opposites(one, two, ahead, counts)
+    else:
+        counts[:] = 0
+        for w in range(words):
+            a, b, place_ahead, place_behind = one[w], two[w], ahead[w], behind[w]
             for k in range(m):
-                counts[k] += n_told - np.int64(2) * np.int64(_ones((a ^ place_ahead[k]) & told))
-            continue
-        place_behind = behind[w]
-        for k in range(m):
-            same = (a & place_ahead[k]) | (b & place_behind[k])
-            other = (a & place_behind[k]) | (b & place_ahead[k])
-            counts[k] += np.int64(_ones(same)) - np.int64(_ones(other))
+                same = (a & place_ahead[k]) | (b & place_behind[k])
+                other = (a & place_behind[k]) | (b & place_ahead[k])
+                counts[k] += np.int64(_ones(same)) - np.int64(_ones(other))
     if corrected:
         for k in range(m):
             divisor = math.sqrt(np.float64(used * ordered[k]))

@@ -219,12 +219,13 @@ def _tau(
     keys: NDArray[np.floating], sign: float, many: _Orders, tau: Tau, scale: float = 1.0, shift: float = 0.0
 ) -> Array:
     """shift + scale tau (m,) of sign times keys (n,), smallest first, with m: Eq. 4 of [1]_, tau-b of [2]_."""
-    out = np.empty(len(many.ordered))
-    keys = np.ascontiguousarray(keys, dtype=np.float64)  # one type, one compiled version
-    arguments = (keys, sign, many.ahead, many.behind, many.ordered, tau == "b", scale, shift, out)
+    ahead, behind, ordered = many
+    out = np.empty(len(ordered))
+    if keys.dtype != np.float64 or not keys.flags.carray:
+        keys = np.require(keys, np.float64, ("C", "W"))  # one type, one compiled version
     if COMPILED:
-        tau_of_places(*arguments)
+        tau_of_places(keys, sign, ahead, behind, ordered, tau == "b", scale, shift, out)
     else:
         with np.errstate(over="ignore"):  # counting bits multiplies modulo 2^64
-            tau_of_places(*arguments)
+            tau_of_places(keys, sign, ahead, behind, ordered, tau == "b", scale, shift, out)
     return out
