@@ -2,7 +2,8 @@
 
     python -m benchmarks.server_fuzz [--bodies 100000] [--page]
 
-Each must be answered, by a status that is described, without a traceback; the server must log no failure, and the good
+Requests, WebSockets, the stream of a card over TCP, and MQTT where there is a mosquitto. Each must be answered (but over
+MQTT, which has no answers), by a status that is described, without a traceback; the server must log no failure, and the good
 phone's track must be that of its walk tracked alone, to the bit.
 """
 
@@ -12,6 +13,7 @@ import argparse
 import asyncio
 import json
 import re
+import socket
 import sys
 import tempfile
 import time
@@ -25,6 +27,8 @@ import uvloop
 from websockets.asyncio.client import connect
 
 from benchmarks.report import machine
+from benchmarks.server_broker import Mosquitto, find_mosquitto
+from benchmarks.server_fuzz_streams import publish, stream
 from benchmarks.server_hostile import hostile
 from benchmarks.server_page import table, write_section
 from benchmarks.server_process import Process, Scene, serving, simulated
@@ -40,7 +44,7 @@ _SEED = 13
 _CONNECTIONS = 6
 _EXPECTED = {200, 400, 408, 413, 415, 422, 499}
 _GOOD_EVERY_S = 0.2
-_SHARE_SOCKET = 0.1  # of the bodies, over WebSockets
+_SHARE_SOCKET, _SHARE_STREAM, _SHARE_MQTT = 0.1, 0.05, 0.1  # of the bodies, not by requests
 _HEAD = re.compile(rb"HTTP/1\.1 (\d+) ")
 _LENGTH = re.compile(rb"content-length: (\d+)", re.IGNORECASE)
 
@@ -68,15 +72,22 @@ def _ways(token: str) -> dict[str, tuple[str, str]]:
     return ways
 
 
-async def fuzz(scene: Scene, server: Process, n: int) -> tuple[Told, str, int]:
-    """What was told, the good phone's track, and the last place in the log that it was given."""
+async def fuzz(scene: Scene, server: Process, n: int, csi_port: int, broker: int) -> tuple[Told, str, int]:
+    """What was told, the good phone's track, and the last place in the log that it was given.
+
+    csi_port : of the server. broker : port of the one it listens to; 0: none.
+    """
     told, over = Told(), asyncio.Event()
     good = asyncio.create_task(_good(scene, server, over))
-    draws = [np.random.default_rng(s) for s in np.random.SeedSequence(_SEED).spawn(_CONNECTIONS + 1)]
-    n_socket = int(_SHARE_SOCKET * n)
-    each = -(-(n - n_socket) // _CONNECTIONS)
-    bad = [asyncio.create_task(_post(server, draw, each, told)) for draw in draws[1:]]
+    draws = [np.random.default_rng(s) for s in np.random.SeedSequence(_SEED).spawn(_CONNECTIONS + 3)]
+    n_socket, n_stream, n_mqtt = (int(share * n) for share in (_SHARE_SOCKET, _SHARE_STREAM, _SHARE_MQTT))
+    n_mqtt = n_mqtt if broker else 0
+    each = -(-(n - n_socket - n_stream - n_mqtt) // _CONNECTIONS)
+    bad = [asyncio.create_task(_post(server, draw, each, told)) for draw in draws[3:]]
     bad.append(asyncio.create_task(_speak(server, draws[0], n_socket, told)))
+    bad.append(asyncio.create_task(stream(server.host, csi_port, server.token, draws[1], n_stream, told)))
+    if broker:
+        bad.append(asyncio.create_task(publish(broker, scene.site.name, draws[2], n_mqtt, told)))
     await asyncio.gather(*bad)
     over.set()
     track, seq = await good
@@ -165,19 +176,29 @@ def main(arguments: list[str] | None = None) -> bool:
     before, began = machine(), time.perf_counter()
     with tempfile.TemporaryDirectory() as folder, (Path(folder) / "errors").open("w+b") as errors:
         scene = simulated(Path(folder), _SEED, walks=1)
-        with serving(scene, Path(folder) / "data", errors=errors, particles=100) as server:
-            told, track, seq = uvloop.run(fuzz(scene, server, options.bodies))
+        program = find_mosquitto()
+        broker = None if program is None else Mosquitto(program, Path(folder))
+        port = _free_port()
+        settings = {"particles": 100, "csi_port": port, "mqtt": broker.url if broker else ""}
+        with serving(scene, Path(folder) / "data", errors=errors, **settings) as server:
+            told, track, seq = uvloop.run(
+                fuzz(scene, server, options.bodies, port, broker.port if broker else 0)
+            )
             wait_applied(server, seq)
             tracker = build_method("fused", scene.site, scene.survey, n_particles=100)
             expected = [said_of(e) for e in tracker.run(replace(scene.walks[0], name=track)).estimates]
             is_exact = exported(server, track) == expected
             health = json.loads(server.get("/health"))["status"]
+        if broker:
+            broker.stop()
         errors.seek(0)
         logged = [
             line for line in errors.read().decode().splitlines() if " ERROR " in line or "Traceback" in line
         ]
     wrong = [*told.wrong, *logged[:5]]
     is_well = is_exact and not wrong and not told.closed and health == "ok"
+    if broker is None:
+        told.statuses["MQTT"] = Counter({"no mosquitto here": 0})
     text = _text(
         told, len(expected), wrong, time.perf_counter() - began, is_exact=is_exact, n_logged=len(logged)
     )
@@ -185,6 +206,13 @@ def main(arguments: list[str] | None = None) -> bool:
     if options.page:
         write_section("fuzz", "python -m benchmarks.server_fuzz --page", before, text)
     return is_well
+
+
+def _free_port() -> int:
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        port: int = free.getsockname()[1]
+    return port
 
 
 def _text(told: Told, n_good: int, wrong: list[str], took: float, *, is_exact: bool, n_logged: int) -> str:

@@ -9,7 +9,7 @@ import numpy as np
 
 from wayfuse.service.routes.examples import EXAMPLES
 
-__all__ = ["hostile"]
+__all__ = ["hostile", "spoiled"]
 
 _RAW = (b"1e999", b"-0", b"null", b"{}", b"[", b'"', b"\xff\xfe", b"9" * 40, b"NaN", b"\x00", b"\\ud800")
 _VALUES: tuple[Any, ...] = (
@@ -30,7 +30,7 @@ def hostile(adapter: str, draw: np.random.Generator) -> bytes:
     if kind < 0.6 and not isinstance(example, str):
         return json.dumps(_changed(example, draw)).encode("utf-8", "surrogatepass")
     body = example.encode() if isinstance(example, str) else json.dumps(example).encode()
-    return _spoiled(body, draw)
+    return spoiled(body, draw)
 
 
 def _changed(value: Any, draw: np.random.Generator) -> Any:
@@ -45,7 +45,7 @@ def _changed(value: Any, draw: np.random.Generator) -> Any:
     return value
 
 
-def _spoiled(body: bytes, draw: np.random.Generator) -> bytes:
+def spoiled(body: bytes, draw: np.random.Generator) -> bytes:
     """A body with up to four cuts, copies, bits turned and foreign pieces."""
     b = bytearray(body)
     for _ in range(int(draw.integers(1, 5))):

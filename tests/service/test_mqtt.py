@@ -4,17 +4,13 @@ from __future__ import annotations
 
 import asyncio
 import json
-import os
-import shutil
-import socket
-import subprocess
 from collections.abc import Callable, Iterator
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import aiomqtt
 import pytest
+from benchmarks.server_broker import Mosquitto, find_mosquitto
 from service_running import App, started, wait_until
 
 from programs import skip_without
@@ -30,43 +26,10 @@ from wayfuse.service.settings import Settings
 from wayfuse.service.wire import encode
 
 
-class Mosquitto:
-    """A broker on a free port of the loopback."""
-
-    def __init__(self, program: str, folder: Path) -> None:
-        with socket.socket() as free:
-            free.bind(("127.0.0.1", 0))
-            self.port = free.getsockname()[1]
-        self._config = folder / "mosquitto.conf"
-        self._config.write_text(f"listener {self.port} 127.0.0.1\nallow_anonymous true\n", encoding="utf-8")
-        self._program = program
-        self.start()
-
-    def start(self) -> None:
-        """Begin, and wait until it listens."""
-        quiet = subprocess.DEVNULL
-        self._process = subprocess.Popen([self._program, "-c", self._config], stdout=quiet, stderr=quiet)
-        wait_until(self._is_up)
-
-    def stop(self) -> None:
-        """End at once."""
-        self._process.kill()
-        self._process.wait(30)
-
-    def _is_up(self) -> bool:
-        with socket.socket() as probe:
-            return probe.connect_ex(("127.0.0.1", self.port)) == 0
-
-    @property
-    def url(self) -> str:
-        """As the server's setting has it."""
-        return f"mqtt://127.0.0.1:{self.port}"
-
-
 @pytest.fixture(scope="module")
 def broker(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Mosquitto]:
     """The broker of the tests of this file."""
-    program = shutil.which("mosquitto", path=os.environ.get("PATH", "") + ":/usr/sbin")
+    program = find_mosquitto()
     if program is None:
         skip_without("mosquitto", "it is not on this machine")
     broker = Mosquitto(program, tmp_path_factory.mktemp("broker"))
