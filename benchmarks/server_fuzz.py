@@ -2,9 +2,9 @@
 
     python -m benchmarks.server_fuzz [--bodies 100000] [--page]
 
-Requests, WebSockets, the stream of a card over TCP, and MQTT where there is a mosquitto. Each must be answered (but over
-MQTT, which has no answers), by a status that is described, without a traceback; the server must log no failure, and the good
-phone's track must be that of its walk tracked alone, to the bit.
+Requests, WebSockets, the stream of a card over TCP, and MQTT where there is a mosquitto. Each must be answered (but
+over MQTT, which has no answers), by a status that is described, without a traceback; the server must log no failure,
+and the good phone's track must be that of its walk tracked alone, to the bit.
 """
 
 from __future__ import annotations
