@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Awaitable, Callable
+from typing import Annotated
 
-from fastapi import Request
+from fastapi import Depends, Query, Request
 from fastapi.security import HTTPBearer
 
 from wayfuse.service.ingest import the_site
@@ -13,7 +14,18 @@ from wayfuse.service.security import bearer
 from wayfuse.service.server import Server
 from wayfuse.storage.tokens import Token
 
-__all__ = ["SCHEME", "allowed", "client_of", "server_of", "site_of"]
+__all__ = [
+    "SCHEME",
+    "Admin",
+    "Reader",
+    "SiteName",
+    "Surveyor",
+    "allowed",
+    "check_all_sites",
+    "client_of",
+    "server_of",
+    "site_of",
+]
 
 # describes the scheme in OpenAPI; the check itself is `allowed`
 SCHEME = HTTPBearer(auto_error=False, description="A token: `Authorization: Bearer wf_...`")
@@ -38,6 +50,25 @@ def allowed(scope: str) -> Callable[[Request], Awaitable[Token]]:
         return await server_of(request).authority.token(bearer(request), scope, site, client_of(request))
 
     return check
+
+
+Reader = Annotated[Token, Depends(allowed("read"))]
+Surveyor = Annotated[Token, Depends(allowed("survey"))]
+Admin = Annotated[Token, Depends(allowed("admin"))]
+SiteName = Annotated[
+    str, Query(max_length=200, description="Name of the site; not needed where there is one.")
+]
+
+
+def check_all_sites(token: Token) -> None:
+    """Refuse a token of one site what concerns all of them.
+
+    Raises
+    ------
+    Problem : 403, it is one.
+    """
+    if token.site:
+        raise Problem(403, "this token is of one site alone", "ask for one of all sites")
 
 
 def site_of(server: Server, token: Token, site: str) -> str:

@@ -10,7 +10,7 @@ from fastapi.concurrency import run_in_threadpool
 from fastapi.responses import FileResponse
 from pydantic import BaseModel, ConfigDict, Field
 
-from wayfuse.service.access import SCHEME, allowed, server_of, site_of
+from wayfuse.service.access import SCHEME, Admin, Surveyor, allowed, check_all_sites, server_of, site_of
 from wayfuse.service.limits import read_body
 from wayfuse.service.problems import Problem, responses
 from wayfuse.service.routes.sent_file import sent_file
@@ -29,8 +29,6 @@ router = APIRouter(
     responses=responses(400, 401, 403, 404, 413, 415, 422, 429),
 )
 
-Admin = Annotated[Token, Depends(allowed("admin"))]
-Surveyor = Annotated[Token, Depends(allowed("survey"))]
 _ZIP = "application/zip"
 _PSEUDONYM = re.compile("[0-9a-f]{16}")
 Text = Annotated[str, Field(max_length=200, pattern=r"^[^\x00-\x1f]*$")]
@@ -136,7 +134,7 @@ def forget(
     scans it pushed for surveys and the walks tapped for it. Recordings that were uploaded do not say whose they are.
     """
     server = server_of(request)
-    _check_all_sites(admin)
+    check_all_sites(admin)
     n, files = 0, 0
     for device in _pseudonyms(server, name):
         n += server.forget(device)
@@ -157,7 +155,7 @@ def export(
 ) -> FileResponse:
     """A ZIP archive: enrolment, tracks (CSV), what the phone sent (Parquet), and what it did for surveys."""
     server = server_of(request)
-    _check_all_sites(admin)
+    check_all_sites(admin)
     device, stores = server.pseudonyms.device(name), surveys_of(request).everywhere()
     answer = sent_file(
         lambda path: write_subject(server, stores, _pseudonyms(server, name), path), _ZIP, f"{device}.zip"
@@ -221,18 +219,13 @@ def audit(
     request: Request, admin: Admin, limit: Annotated[int, Query(ge=1, le=1000)] = 100
 ) -> dict[str, Any]:
     """Newest first."""
-    _check_all_sites(admin)
+    check_all_sites(admin)
     return {"audit": [row._asdict() for row in server_of(request).audit.newest(limit)]}
 
 
 def _pseudonyms(server: Server, name: str) -> list[str]:
     """Under what a phone may be kept: of its name, and the name itself where it is a pseudonym already."""
     return [server.pseudonyms.device(name), *([name] if _PSEUDONYM.fullmatch(name) else [])]
-
-
-def _check_all_sites(admin: Token) -> None:
-    if admin.site:
-        raise Problem(403, "this token is of one site alone", "ask for one of all sites")
 
 
 def _token(token: Token) -> dict[str, Any]:

@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal
 from fastapi import APIRouter, Depends, Query, Request
 from fastapi.responses import FileResponse, Response
 
-from wayfuse.service.access import SCHEME, allowed, server_of, site_of
+from wayfuse.service.access import SCHEME, Reader, allowed, server_of, site_of
 from wayfuse.service.export import to_csv, to_gpx, to_mf_json
 from wayfuse.service.history import estimates_of
 from wayfuse.service.live import Look, View
@@ -29,7 +29,6 @@ router = APIRouter(
 )
 
 Administrator = Annotated[Token, Depends(allowed("admin"))]
-Reader = Annotated[Token, Depends(allowed("read"))]
 Site = Annotated[str, Query(max_length=200, description="Of this site alone.")]
 Time = Annotated[float | None, Query(description="s, of the phone's clock.", allow_inf_nan=False)]
 _MOST = 10_000

@@ -7,12 +7,11 @@ from typing import Annotated, Any, Literal
 from fastapi import APIRouter, Depends, Query, Request
 from fastapi.concurrency import run_in_threadpool
 
-from wayfuse.service.access import SCHEME, allowed, server_of
+from wayfuse.service.access import SCHEME, Admin, check_all_sites, server_of
 from wayfuse.service.limits import read_body
-from wayfuse.service.problems import Problem, responses
+from wayfuse.service.problems import responses
 from wayfuse.service.site_changes import add_site, remove_site
 from wayfuse.service.uploaded_sites import read_upload
-from wayfuse.storage.tokens import Token
 
 __all__ = ["router"]
 
@@ -23,7 +22,6 @@ router = APIRouter(
     responses=responses(400, 401, 403, 404, 408, 409, 413, 415, 422, 429, 503),
 )
 
-Admin = Annotated[Token, Depends(allowed("admin"))]
 Format = Literal["hcu", "image", "imdf", "ipin2023", "ms-indoor", "osm", "simpleloc", "wayfuse"]
 _BODY = {
     "requestBody": {
@@ -48,7 +46,7 @@ async def upload(
     Where there was one site and now are two, phones have to say which they mean.
     """
     server = server_of(request)
-    _check_all_sites(admin)
+    check_all_sites(admin)
     body = await read_body(request, server.settings.max_upload_bytes)
     site, said = await run_in_threadpool(read_upload, plan_format, body, file, name)
     await run_in_threadpool(add_site, server, site, admin.id, replace=replace)
@@ -58,11 +56,6 @@ async def upload(
 @router.delete("", summary="Take away an imported site")
 def remove(request: Request, admin: Admin, site: Annotated[str, Query(max_length=200)]) -> dict[str, Any]:
     """Its tracks, radio maps and survey stay where they are, and are there again if it is imported again."""
-    _check_all_sites(admin)
+    check_all_sites(admin)
     remove_site(server_of(request), site, admin.id)
     return {"removed": site}
-
-
-def _check_all_sites(admin: Token) -> None:
-    if admin.site:
-        raise Problem(403, "this token is of one site alone", "ask for one of all sites")

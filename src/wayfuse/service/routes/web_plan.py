@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from typing import Any
 
-from fastapi import APIRouter, Depends, Query, Request
+from fastapi import APIRouter, Depends, Request
 
-from wayfuse.service.access import SCHEME, allowed, server_of, site_of
+from wayfuse.service.access import SCHEME, Reader, SiteName, server_of, site_of
 from wayfuse.service.problems import Problem, responses
 from wayfuse.service.web.plan import floor_features, floor_frame
-from wayfuse.storage.tokens import Token
 
 __all__ = ["router"]
 
@@ -20,12 +19,9 @@ router = APIRouter(
     responses=responses(401, 403, 422, 429),
 )
 
-Reader = Annotated[Token, Depends(allowed("read"))]
-Site = Annotated[str, Query(max_length=200, description="Name of the site; not needed where there is one.")]
-
 
 @router.get("", summary="Floors of a site")
-def floors(request: Request, token: Reader, site: Site = "") -> dict[str, Any]:
+def floors(request: Request, token: Reader, site: SiteName = "") -> dict[str, Any]:
     """Bottom up; ``origin`` and ``matrix`` take metres of a floor's frame to longitude and latitude."""
     server = server_of(request)
     name = site_of(server, token, site)
@@ -34,7 +30,7 @@ def floors(request: Request, token: Reader, site: Site = "") -> dict[str, Any]:
 
 
 @router.get("/{floor}", summary="Plan of a floor", responses=responses(404))
-def plan(request: Request, token: Reader, floor: int, site: Site = "") -> dict[str, Any]:
+def plan(request: Request, token: Reader, floor: int, site: SiteName = "") -> dict[str, Any]:
     """GeoJSON: outline, units, walls, doors, connectors and their landings."""
     server = server_of(request)
     found = server.worlds[site_of(server, token, site)].site

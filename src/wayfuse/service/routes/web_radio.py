@@ -10,11 +10,10 @@ from fastapi import APIRouter, Depends, Query, Request
 from wayfuse.core.types import Array
 from wayfuse.models.survey_coverage import Grid, coverage, heard_at, level_of, next_places
 from wayfuse.sensors.records import bssid_text
-from wayfuse.service.access import SCHEME, allowed, server_of, site_of
+from wayfuse.service.access import SCHEME, SiteName, Surveyor, server_of, site_of
 from wayfuse.service.adapters.parts import identifier
 from wayfuse.service.problems import Problem, responses
 from wayfuse.service.web.surveys import surveys_of
-from wayfuse.storage.tokens import Token
 
 __all__ = ["router"]
 
@@ -25,15 +24,13 @@ router = APIRouter(
     responses=responses(401, 403, 404, 422, 429),
 )
 
-Surveyor = Annotated[Token, Depends(allowed("survey"))]
-Site = Annotated[str, Query(max_length=200, description="Name of the site; not needed where there is one.")]
 FloorIndex = Annotated[int, Query(ge=0, le=1000, description="Index of the floor, from 0 bottom up.")]
 Version = Annotated[int | None, Query(ge=1, le=2**31 - 1, description="Of the radio map; the one in use.")]
 
 
 @router.get("/coverage", summary="How far the next fingerprint is")
 def covered(
-    request: Request, token: Surveyor, floor: FloorIndex, site: Site = "", version: Version = None
+    request: Request, token: Surveyor, floor: FloorIndex, site: SiteName = "", version: Version = None
 ) -> dict[str, Any]:
     """A grid of distances (m, null where nobody walks), where to survey next, and the fingerprints' places."""
     server = server_of(request)
@@ -60,7 +57,7 @@ def covered(
 def access_points(
     request: Request,
     token: Surveyor,
-    site: Site = "",
+    site: SiteName = "",
     version: Version = None,
     limit: Annotated[int, Query(ge=1, le=10_000)] = 500,
 ) -> dict[str, Any]:
@@ -94,7 +91,7 @@ def heat(
     token: Surveyor,
     bssid: Annotated[str, Query(min_length=1, max_length=200)],
     floor: FloorIndex,
-    site: Site = "",
+    site: SiteName = "",
     version: Version = None,
 ) -> dict[str, Any]:
     """A grid of levels (dBm), null farther than 5 m from any fingerprint."""

@@ -13,7 +13,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from wayfuse.formats.reading import read
 from wayfuse.models.survey_walk import survey_walk
 from wayfuse.sensors.records import WifiScan, bssid_text
-from wayfuse.service.access import SCHEME, allowed, client_of, server_of, site_of
+from wayfuse.service.access import SCHEME, SiteName, Surveyor, client_of, server_of, site_of
 from wayfuse.service.adapters import ADAPTERS
 from wayfuse.service.ingest import completed, ingest
 from wayfuse.service.limits import read_body
@@ -24,7 +24,6 @@ from wayfuse.service.web.survey_build import build
 from wayfuse.service.web.survey_store import Push, TappedWalk, Waypoint
 from wayfuse.service.web.surveys import Surveys, surveys_of
 from wayfuse.service.wire import Ap, Scan
-from wayfuse.storage.tokens import Token
 
 __all__ = ["by_path", "router"]
 
@@ -38,8 +37,6 @@ router = APIRouter(
     responses=responses(400, 401, 403, 404, 408, 413, 415, 422, 429),
 )
 by_path = APIRouter()  # with the token in the address
-Surveyor = Annotated[Token, Depends(allowed("survey"))]
-Site = Annotated[str, Query(max_length=200, description="Name of the site; not needed where there is one.")]
 Seconds = Annotated[float, Field(ge=0.0, le=1e11, allow_inf_nan=False)]
 Metres = Annotated[float, Field(ge=-1e5, le=1e5, allow_inf_nan=False)]
 Identifier = Annotated[str, Field(pattern="^[0-9a-f]{16}$")]
@@ -78,7 +75,7 @@ class NewWalk(BaseModel):
 
 
 @router.get("", summary="What the survey has")
-def survey(request: Request, token: Surveyor, site: Site = "") -> dict[str, Any]:
+def survey(request: Request, token: Surveyor, site: SiteName = "") -> dict[str, Any]:
     """Phones that push scans, walks, recordings, and the last job."""
     server, surveys = server_of(request), surveys_of(request)
     name = site_of(server, token, site)
@@ -100,7 +97,7 @@ def survey(request: Request, token: Surveyor, site: Site = "") -> dict[str, Any]
     status_code=201,
     summary="Keep a walk tapped on the map",
 )
-def add_walk(request: Request, token: Surveyor, walk: NewWalk, site: Site = "") -> dict[str, Any]:
+def add_walk(request: Request, token: Surveyor, walk: NewWalk, site: SiteName = "") -> dict[str, Any]:
     """A place where somebody stood is two taps at one place; between two taps the way is straight and even."""
     server = server_of(request)
     name = site_of(server, token, site)
@@ -134,7 +131,7 @@ def add_walk(request: Request, token: Surveyor, walk: NewWalk, site: Site = "") 
 async def add_recording(
     request: Request,
     token: Surveyor,
-    site: Site = "",
+    site: SiteName = "",
     name: Annotated[str, Query(max_length=200, description="Of the file; its ending may matter.")] = "",
 ) -> dict[str, Any]:
     """A recording with waypoints of any format `wayfuse survey build` reads, whole; it is read before it is kept."""
@@ -167,7 +164,7 @@ def _keep_recording(
     "/parts/{identifier}",
     summary="Delete a walk or a recording",
 )
-def remove(request: Request, token: Surveyor, identifier: str, site: Site = "") -> dict[str, Any]:
+def remove(request: Request, token: Surveyor, identifier: str, site: SiteName = "") -> dict[str, Any]:
     """Radio maps built with it stay as they are."""
     server = server_of(request)
     name = site_of(server, token, site)
@@ -182,7 +179,7 @@ def remove(request: Request, token: Surveyor, identifier: str, site: Site = "") 
     status_code=202,
     summary="Build a radio map of what the survey has",
 )
-def start_job(request: Request, token: Surveyor, site: Site = "") -> dict[str, Any]:
+def start_job(request: Request, token: Surveyor, site: SiteName = "") -> dict[str, Any]:
     """The job's result names the new version, which is not yet published, and its held-out errors room by room."""
     server, surveys = server_of(request), surveys_of(request)
     name = site_of(server, token, site)

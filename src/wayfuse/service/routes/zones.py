@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from typing import Any
 
-from fastapi import APIRouter, Depends, Query, Request
+from fastapi import APIRouter, Depends, Request
 
-from wayfuse.service.access import SCHEME, allowed, server_of, site_of
+from wayfuse.service.access import SCHEME, Reader, SiteName, server_of, site_of
 from wayfuse.service.problems import responses
 from wayfuse.service.routes.answers import Inside, answer
 from wayfuse.service.web.plan import zone_features
-from wayfuse.storage.tokens import Token
 
 __all__ = ["router"]
 
@@ -21,12 +20,9 @@ router = APIRouter(
     responses=responses(401, 403, 422, 429),
 )
 
-Reader = Annotated[Token, Depends(allowed("read"))]
-Site = Annotated[str, Query(max_length=200, description="Name of the site; not needed where there is one.")]
-
 
 @router.get("", summary="Rooms and geofences")
-def zones(request: Request, token: Reader, site: Site = "") -> dict[str, Any]:
+def zones(request: Request, token: Reader, site: SiteName = "") -> dict[str, Any]:
     """GeoJSON: ``id``, ``name``, ``kind`` (room or geofence), ``floor`` and ``level`` of each."""
     server = server_of(request)
     world = server.worlds[site_of(server, token, site)]
@@ -36,7 +32,7 @@ def zones(request: Request, token: Reader, site: Site = "") -> dict[str, Any]:
 @router.get(
     "/inside", summary="Who is in which room or geofence", responses=answer(Inside), response_model=None
 )
-def inside(request: Request, token: Reader, site: Site = "") -> dict[str, Any]:
+def inside(request: Request, token: Reader, site: SiteName = "") -> dict[str, Any]:
     """Tracks by ``id`` of the zone; zones that nobody is in are left out, and so are tracks that have ended."""
     server = server_of(request)
     name = site_of(server, token, site)
