@@ -99,6 +99,12 @@ def working(fake: Any, **config: Any) -> Iterator[Pipeline]:
     pipeline.stop()
 
 
+def _submit(pipeline: Pipeline, items: list[Item]) -> Future[list[int]]:
+    done: Future[list[int]] = Future()
+    pipeline.put(items, done)
+    return done
+
+
 def _item(size: int = 1) -> Item:
     return Item(Entry(0, 0.0, "s", "own", "d", "t", "{}", b"x" * size), Message("d", "", b"", ()))
 
@@ -106,7 +112,7 @@ def _item(size: int = 1) -> Item:
 def test_entries_are_logged_then_answered_then_applied_in_order() -> None:
     fake = Fake()
     with working(fake) as pipeline:
-        futures = [pipeline.submit([_item()] * n) for n in (1, 3, 2)]
+        futures = [_submit(pipeline, [_item()] * n) for n in (1, 3, 2)]
         assert [f.result(30) for f in futures] == [[1], [2, 3, 4], [5, 6]]
     assert fake.logged == fake.applied == [1, 2, 3, 4, 5, 6]
     assert fake.saved == [(6, ["a 6", "b 6"])]  # at the end
@@ -117,14 +123,14 @@ def test_after_a_group_of_several_more_is_waited_for() -> None:
     fake = Fake()
     fake.gate.clear()
     with working(fake, gather=60.0, enough=3) as pipeline:
-        pipeline.submit([_item()])
+        _submit(pipeline, [_item()])
         wait_until(lambda: pipeline.n_waiting == 0)  # taken, and held at the gate
-        several = [pipeline.submit([_item()]) for _ in range(2)]
+        several = [_submit(pipeline, [_item()]) for _ in range(2)]
         fake.gate.set()
         assert [f.result(30) for f in several] == [[2], [3]]
-        more = [pipeline.submit([_item()]) for _ in range(3)]
+        more = [_submit(pipeline, [_item()]) for _ in range(3)]
         assert [f.result(30) for f in more] == [[4], [5], [6]]  # enough: nothing more is waited for
-        last = pipeline.submit([_item()])
+        last = _submit(pipeline, [_item()])
         assert not last.done()
     assert last.result(0) == [7]  # nor at the end
     assert fake.groups == [1, 2, 3, 1]
@@ -133,7 +139,7 @@ def test_after_a_group_of_several_more_is_waited_for() -> None:
 def test_one_that_sends_alone_is_not_kept_waiting() -> None:
     fake = Fake()
     with working(fake, gather=60.0) as pipeline:
-        assert [pipeline.submit([_item()]).result(30) for _ in range(5)] == [[n] for n in range(1, 6)]
+        assert [_submit(pipeline, [_item()]).result(30) for _ in range(5)] == [[n] for n in range(1, 6)]
 
 
 def test_a_sender_that_has_gone_is_not_told() -> None:
@@ -144,7 +150,7 @@ def test_a_sender_that_has_gone_is_not_told() -> None:
             gone = Future[list[int]]()
             gone.cancel()
             pipeline.put([_item()], gone)
-        assert pipeline.submit([_item()]).result(30) == [2]
+        assert _submit(pipeline, [_item()]).result(30) == [2]
     assert fake.applied == [1, 2]
 
 
@@ -153,8 +159,8 @@ def test_a_log_that_cannot_be_written_answers_busy_and_applies_nothing() -> None
     with working(fake) as pipeline:
         fake.fail_append = 1
         with pytest.raises(BusyError, match="cannot be written"):
-            pipeline.submit([_item()]).result(30)
-        assert pipeline.submit([_item()]).result(30) == [1]  # no gap in the numbers
+            _submit(pipeline, [_item()]).result(30)
+        assert _submit(pipeline, [_item()]).result(30) == [1]  # no gap in the numbers
     assert fake.applied == [1]
 
 
@@ -162,7 +168,7 @@ def test_a_database_that_is_away_delays_tracks_but_loses_nothing() -> None:
     fake = Fake()
     with working(fake) as pipeline:
         fake.fail_apply = 3
-        pipeline.submit([_item()] * 2).result(30)
+        _submit(pipeline, [_item()] * 2).result(30)
         wait_until(lambda: pipeline.applied == 2)
     assert fake.applied == [1, 2]
 
@@ -171,7 +177,7 @@ def test_a_checkpoint_that_cannot_be_written_is_written_later() -> None:
     fake = Fake()
     fake.fail_save = 1
     with working(fake, checkpoint_every=1.0) as pipeline:
-        pipeline.submit([_item()]).result(30)
+        _submit(pipeline, [_item()]).result(30)
         wait_until(lambda: fake.rounds)
     assert fake.saved[:2] == [(1, ["a 1", "b 1"]), (1, [])]  # nothing that was drained is lost
 
@@ -179,9 +185,9 @@ def test_a_checkpoint_that_cannot_be_written_is_written_later() -> None:
 def test_a_round_is_written_in_slices_between_groups() -> None:
     fake = Fake()
     with working(fake, checkpoint_every=5.0, slice=1) as pipeline:
-        pipeline.submit([_item()]).result(30)
+        _submit(pipeline, [_item()]).result(30)
         wait_until(lambda: fake.rounds)
-        pipeline.submit([_item()]).result(30)
+        _submit(pipeline, [_item()]).result(30)
     assert fake.saved[:2] == [(1, ["a 1"]), (1, ["b 1"])]
     assert fake.saved[-1] == (2, ["a 2", "b 2"])  # at the end all at once
     assert fake.rounds[0] == 1
@@ -192,11 +198,11 @@ def test_too_much_that_waits_is_refused() -> None:
     fake = Fake()
     fake.gate.clear()
     with working(fake, max_waiting=3, group=1) as pipeline:
-        first = pipeline.submit([_item()])
+        first = _submit(pipeline, [_item()])
         wait_until(lambda: pipeline.n_waiting == 0)  # taken, and held at the gate
-        more = [pipeline.submit([_item()]) for _ in range(3)]
+        more = [_submit(pipeline, [_item()]) for _ in range(3)]
         with pytest.raises(BusyError, match="busy"):
-            pipeline.submit([_item()])
+            _submit(pipeline, [_item()])
         fake.gate.set()
         assert [f.result(30) for f in [first, *more]] == [[1], [2], [3], [4]]
 
@@ -205,11 +211,11 @@ def test_bytes_that_wait_are_limited_but_one_body_always_fits() -> None:
     fake = Fake()
     fake.gate.clear()
     with working(fake, max_waiting_bytes=10, group=1) as pipeline:
-        pipeline.submit([_item()])
+        _submit(pipeline, [_item()])
         wait_until(lambda: pipeline.n_waiting == 0)
-        large = pipeline.submit([_item(50)])
+        large = _submit(pipeline, [_item(50)])
         with pytest.raises(BusyError):
-            pipeline.submit([_item(1)])
+            _submit(pipeline, [_item(1)])
         fake.gate.set()
         assert large.result(30) == [2]
 
@@ -222,10 +228,10 @@ def test_a_broken_pipeline_says_so_and_takes_nothing_more() -> None:
 
     pipeline = Pipeline(fake, fake, fake, 1, clock=lambda: 0.0, publish=broken)
     pipeline.start()
-    assert pipeline.submit([_item()]).result(30) == [1]
+    assert _submit(pipeline, [_item()]).result(30) == [1]
     wait_until(lambda: pipeline.is_broken)
     with pytest.raises(BusyError):
-        pipeline.submit([_item()])
+        _submit(pipeline, [_item()])
     with pytest.raises(BusyError):
         pipeline.call(lambda: 1)
     pipeline.stop()
@@ -236,7 +242,7 @@ def test_calls_run_between_groups_and_their_errors_are_the_caller_s() -> None:
         assert pipeline.call(threading.get_ident).result(30) != threading.get_ident()
         with pytest.raises(ZeroDivisionError):
             pipeline.call(lambda: 1 // 0).result(30)
-        assert pipeline.submit([_item()]).result(30) == [1]
+        assert _submit(pipeline, [_item()]).result(30) == [1]
 
 
 @pytest.mark.parametrize("bad", [{"group": 0}, {"max_waiting": 0}, {"checkpoint_every": 0.0}])

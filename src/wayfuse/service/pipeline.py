@@ -159,19 +159,8 @@ class Pipeline:
             self._wake.notify()
         self._thread.join()
 
-    def submit(self, items: Sequence[Item]) -> Future[list[int]]:
-        """Hand over a batch; the future has the seqs when they are on the disk.
-
-        Raises
-        ------
-        BusyError : too much waits already, or the server is going down.
-        """
-        done: Future[list[int]] = Future()
-        self.put(items, done)
-        return done
-
     def put(self, items: Sequence[Item], done: Done) -> None:
-        """As `submit`, with a future of the caller's; ``answer`` must be able to touch it.
+        """Hand over a batch; ``done`` gets the seqs when they are on the disk: ``answer`` must be able to touch it.
 
         Raises
         ------
