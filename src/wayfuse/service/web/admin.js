@@ -1,7 +1,7 @@
 // Administration: tokens, what is kept of a phone, and who did what.
 
 import { get, post, remove, save } from "/web/api.js";
-import { action, ago, el } from "/web/dom.js";
+import { action, ago, el, trying } from "/web/dom.js";
 import { store } from "/web/store.js";
 
 const SCOPES = { read: "see the map", ingest: "send what phones send", survey: "make and publish radio maps", admin: "everything" };
@@ -23,14 +23,7 @@ export function startAdmin(view) {
       el("time", { textContent: ago(store.now - row.at), title: new Date(1000 * row.at).toLocaleString() }),
       el("span", { textContent: `${name.get(row.actor) ?? row.actor}: ${row.action} ${name.get(row.subject) ?? row.subject}${row.detail ? ` (${row.detail})` : ""}` }))));
   };
-  const tried = async (work) => {
-    try {
-      await work();
-      said.textContent = "";
-    } catch (error) {
-      said.textContent = error.message;
-    }
-  };
+  const tried = trying(said);
   return { opened: () => tried(list), left: () => tokens.forget() };
 }
 

@@ -44,6 +44,16 @@ export function age(seconds) {
 
 export const ago = (seconds) => (seconds < 2 ? "just now" : `${age(seconds)} ago`);
 
+/** A function that runs work and says in an element what went wrong, or nothing. */
+export const trying = (said) => async (work) => {
+  try {
+    await work();
+    said.textContent = "";
+  } catch (error) {
+    said.textContent = error.message;
+  }
+};
+
 /** A control that runs `work` when pressed, is busy meanwhile, and says what went wrong. */
 export function action(text, work, props = {}) {
   const said = el("span", { role: "status", className: "said" });

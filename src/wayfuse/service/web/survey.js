@@ -1,7 +1,7 @@
 // Survey tools: record, upload, build, look, publish.
 
 import { get, post, remove } from "/web/api.js";
-import { action, ago, el, metres, percent } from "/web/dom.js";
+import { action, ago, el, metres, percent, trying } from "/web/dom.js";
 import { collection, feature } from "/web/frames.js";
 import { store } from "/web/store.js";
 import { startPictures } from "/web/survey_pictures.js";
@@ -44,14 +44,7 @@ export function startSurvey(view, map, imported) {
   const building = startImport(imported);
   view.append(said, pictures.element, record.element, parts.element, builder.element, versions.element, building.element);
 
-  const tried = async (work) => {
-    try {
-      await work();
-      said.textContent = "";
-    } catch (error) {
-      said.textContent = error.message;
-    }
-  };
+  const tried = trying(said);
   setInterval(() => open && !document.hidden && tried(ask), ASK_MS);
   store.on("floor", () => draw());
   store.on("site", () => open && opened());
