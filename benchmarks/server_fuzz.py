@@ -13,7 +13,6 @@ import argparse
 import asyncio
 import json
 import re
-import socket
 import sys
 import tempfile
 import time
@@ -27,7 +26,7 @@ import uvloop
 from websockets.asyncio.client import connect
 
 from benchmarks.report import machine
-from benchmarks.server_broker import Mosquitto, find_mosquitto
+from benchmarks.server_broker import Mosquitto, find_mosquitto, free_port
 from benchmarks.server_fuzz_streams import publish, stream
 from benchmarks.server_hostile import hostile
 from benchmarks.server_page import table, write_section
@@ -178,7 +177,7 @@ def main(arguments: list[str] | None = None) -> bool:
         scene = simulated(Path(folder), _SEED, walks=1)
         program = find_mosquitto()
         broker = None if program is None else Mosquitto(program, Path(folder))
-        port = _free_port()
+        port = free_port()
         settings = {"particles": 100, "csi_port": port, "mqtt": broker.url if broker else ""}
         with serving(scene, Path(folder) / "data", errors=errors, **settings) as server:
             told, track, seq = uvloop.run(
@@ -206,13 +205,6 @@ def main(arguments: list[str] | None = None) -> bool:
     if options.page:
         write_section("fuzz", "python -m benchmarks.server_fuzz --page", before, text)
     return is_well
-
-
-def _free_port() -> int:
-    with socket.socket() as free:
-        free.bind(("127.0.0.1", 0))
-        port: int = free.getsockname()[1]
-    return port
 
 
 def _text(told: Told, n_good: int, wrong: list[str], took: float, *, is_exact: bool, n_logged: int) -> str:
