@@ -115,11 +115,11 @@ def _render(
     import numpy as np
 
     from wayfuse.core.errors import RadioMapError
-    from wayfuse.radio.channel_accuracy import held_out_errors
+    from wayfuse.radio.channel_accuracy import range_errors
     from wayfuse.sensors.records import bssid_text
 
     try:
-        errors = np.abs(held_out_errors(walks)) if len(walks) > 1 else np.empty(0)
+        errors = np.abs(range_errors(walks)) if len(walks) > 1 else np.empty(0)
     except RadioMapError:  # too little is left without one of the walks
         errors = np.empty(0)
     accuracy: dict[str, float] | None = None

@@ -53,12 +53,13 @@ class Result:
 class _Loaded:
     """What a process loads once. trackers : by method; of a method that needs a start only where one is told."""
 
-    def __init__(self, site: Site, survey: Survey | None, places: ApPlaces | None) -> None:
+    def __init__(
+        self, site: Site, survey: Survey | None, places: ApPlaces | None, channel: ChannelRanging | None
+    ) -> None:
         from wayfuse.models.observation.coverage import SurveyDistance
 
-        self.site, self.survey, self.places = site, survey, places
+        self.site, self.survey, self.places, self.channel = site, survey, places, channel
         self.distance: SurveyDistance | None = None if survey is None else SurveyDistance.build(survey)
-        self.channel: ChannelRanging | None = None
         self.trackers: dict[str, Any] = {}
 
 
@@ -105,8 +106,8 @@ class Worker:
             self._check_needs()
             start = _check_start(self.start, site) if self.start is not None or self._need("start") else None
             survey = None if self.given.radio_map is None else _survey(site, self.given.radio_map)
-            loaded = _Loaded(site, survey, _places(site, self.given.access_points))
-            loaded.channel = _channel(site, self.given.channel_model)
+            channel = _channel(site, self.given.channel_model)
+            loaded = _Loaded(site, survey, _places(site, self.given.access_points), channel)
             loaded.trackers = {
                 name: self._build(loaded, name, start)
                 for name in self.methods

@@ -11,10 +11,10 @@ from wayfuse.radio.channel_model import fit_channel_model
 from wayfuse.radio.channel_ranging import ChannelRanging, ChannelState
 from wayfuse.sensors.records import CsiFrame
 
-__all__ = ["held_out_errors"]
+__all__ = ["range_errors"]
 
 
-def held_out_errors(walks: Sequence[tuple[Sequence[CsiFrame], Array]], moment: float = 0.5) -> Array:
+def range_errors(walks: Sequence[tuple[Sequence[CsiFrame], Array]], moment: float = 0.5) -> Array:
     """Ranges minus distances (n,) m, one per moment and anchor, of all walks.
 
     Parameters
