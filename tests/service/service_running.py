@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import os
-import secrets
 import signal
 import subprocess
 import sys
 import time
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 import httpx2
+import numpy as np
 from starlette.testclient import TestClient
 
 from wayfuse.service.app import create_app
@@ -25,6 +26,7 @@ from wayfuse.storage.log import last_seq
 __all__ = ["App", "Running", "running", "started", "wait_until"]
 
 _START_S = 60.0
+_BEGUN: Counter[Path] = Counter()  # servers begun in this process, by their folder
 
 
 @dataclass
@@ -168,6 +170,10 @@ def started(
     values = {"particles": 100, "rate_per_s": 0.0} | settings
     if sites is None:
         sites = [SiteFiles(world.folder / "SITE", world.folder / radio_map if radio_map else None)]
-    server = Server(Settings(data=str(data), **values), sites, clock=time.time, random=secrets.token_bytes)
+    # the names of tracks, and so their particles, come from random bytes: the same ones in each run of the tests, and
+    # other ones each time that a server begins on the same data, for no two tokens may be equal
+    _BEGUN[data] += 1
+    random = np.random.default_rng([_BEGUN[data]]).bytes
+    server = Server(Settings(data=str(data), **values), sites, clock=time.time, random=random)
     with TestClient(create_app(server), raise_server_exceptions=False) as client:
         yield App(server, client)

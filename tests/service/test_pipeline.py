@@ -346,3 +346,14 @@ async def _quiet_until_mine(hub: Hub) -> bytes:
 
 def test_a_stream_of_one_track_is_silent_about_others() -> None:
     assert asyncio.run(_quiet_until_mine(Hub(10))) == b"id: 3\nevent: position\ndata: {}\n\n"
+
+
+def test_a_stream_of_what_is_there_ends_where_the_log_has_gone_on_without_events() -> None:
+    async def told() -> list[bytes]:
+        hub = Hub(10)
+        hub.publish([_event(1)], 7)  # six batches more that moved nobody
+        lines = _lines(cast("Server", SimpleNamespace(hub=hub)), "", "", 0, once=True)
+        async with asyncio.timeout(5.0):  # it used to wait for the next event
+            return [block async for block in lines]
+
+    assert b"".join(asyncio.run(told())).count(b"event: position") == 1

@@ -74,6 +74,10 @@ class Hub:
         """Whether all events after an identifier are still here."""
         return self._dropped <= last <= self._last
 
+    def held_after(self, last: int) -> list[Event]:
+        """Events after an identifier that are here already."""
+        return self._ring[bisect_right(self._ring, last, key=attrgetter("id")) :]
+
     async def after(self, last: int, beat: float) -> AsyncIterator[list[Event]]:
         """Events after an identifier, as they come, in lists; an empty list after each ``beat`` s of silence.
 
@@ -82,9 +86,7 @@ class Hub:
         self.n_clients += 1
         try:
             while not self._closed and last >= self._dropped:
-                at = bisect_right(self._ring, last, key=attrgetter("id"))
-                events = self._ring[at:]
-                if events:
+                if events := self.held_after(last):
                     last = events[-1].id
                     yield events
                     continue

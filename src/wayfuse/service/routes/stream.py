@@ -72,24 +72,26 @@ async def _lines(
         last = hub.last  # events after it may be in the snapshot too: then they say the same again
         body = await run_in_threadpool(_snapshot, server, site, track)
         yield f"id: {last}\nevent: snapshot\ndata: ".encode() + body + b"\n\n"
-    if once and last >= hub.last:
+    if once:
+        yield _block(hub.held_after(last), site, track)
         return
     clock = asyncio.get_running_loop().time
     spoke = clock()
     async for some in hub.after(last, _BEAT_S):
-        lines = b"".join(_line(e) for e in some if _is_wanted(e, site, track))
-        if (
-            lines or not some or clock() - spoke >= _BEAT_S
-        ):  # who asks for one track is not told of all others
+        block = _block(some, site, track)
+        # who asks for one track is not told of all others, and yet hears that the server is there
+        if block or not some or clock() - spoke >= _BEAT_S:
             spoke = clock()
-            yield lines or b": still here\n\n"
-        if once and (not some or some[-1].id >= hub.last):
-            return
+            yield block or b": still here\n\n"
 
 
 def _snapshot(server: Server, site: str, track: str) -> bytes:
     views = [v for v in server.live.views(site) if track in {"", v.row.track}]
     return msgspec.json.encode([f for v in views if (f := server.feature(v)) is not None])
+
+
+def _block(events: list[Event], site: str, track: str) -> bytes:
+    return b"".join(_line(e) for e in events if _is_wanted(e, site, track))
 
 
 def _line(event: Event) -> bytes:
