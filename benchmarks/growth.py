@@ -105,7 +105,7 @@ def memory() -> Table:
     walls = sum(a.nbytes for a in index.arrays)
     levels = model_of(world, walls=False).levels.levels.nbytes
     ranks = from_positions(rng.uniform((0, 0), (80, 50), (30, 2)), (0.0, 0.0, 80.0, 50.0), 2.0)
-    bits = sum(a.nbytes for a in ranks.orders)
+    bits = ranks.orders.nbytes
     xy = rng.uniform((0.0, 0.0), (80.0, 50.0), (500, 2))
     survey = Survey.from_dense(rng.uniform(-90, -40, (500, 30)), xy, np.zeros(500, np.int32), ("0",))
     grid = fit(survey).grids[0]

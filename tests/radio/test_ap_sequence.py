@@ -140,6 +140,8 @@ def test_wrong_use_says_so() -> None:
         nearest(SQUARE, np.ones(4), 0)
     with pytest.raises(UsageError, match="one value per access point"):
         from_positions(SQUARE, EXTENT, 1.0).similarity(np.zeros(3))
+    with pytest.raises(UsageError, match=r"\(5,\) and \(2, 4\)"):
+        kendall_tau(np.zeros(5), np.zeros((2, 4)))
 
 
 def counted_in_numpy(first: Array, second: Array, tau: str) -> Array:
@@ -153,8 +155,8 @@ def counted_in_numpy(first: Array, second: Array, tau: str) -> Array:
 
 @pytest.mark.parametrize("tau", ["a", "b"])
 @pytest.mark.parametrize(
-    "n", [2, 11, 12, 30, 100]
-)  # 1, 55, 66, 435 and 4950 pairs: words partly and wholly used
+    "n", [1, 2, 11, 12, 30, 100]
+)  # 0, 1, 55, 66, 435 and 4950 pairs: words partly and wholly used, one pass and several
 def test_the_kernel_is_its_twin_to_the_bit(n: int, tau: Literal["a", "b"]) -> None:
     rng = np.random.default_rng(n)
     first, second = rng.integers(0, n, n).astype(np.float64), rng.integers(0, n, (70, n)).astype(np.float64)

@@ -55,17 +55,10 @@ __all__ = [
 Tau = Literal["a", "b"]
 _WORD = 64  # bits
 _NEVER = -np.inf  # dBm that stands for "not heard": weaker than any reading, equal to itself
-
-
-class _Orders(NamedTuple):
-    """Bits of the pairs of each sequence, (words, m): first before second, second before first; (m,) not tied.
-
-    Where no sequence has a tie the second is the opposite of the first, and has no rows.
-    """
-
-    ahead: NDArray[np.uint64]
-    behind: NDArray[np.uint64]
-    ordered: NDArray[np.int64]
+_FLOAT = np.dtype(np.float64)
+# sign of the keys, 1 for tau-b, scale, shift: an array, for each number by itself takes a call of compiled code longer
+_AS_IT_IS = {"a": np.array([1.0, 0.0, 1.0, 0.0]), "b": np.array([1.0, 1.0, 1.0, 0.0])}
+_SIMILARITY = {"a": np.array([-1.0, 0.0, 0.5, 0.5]), "b": np.array([-1.0, 1.0, 0.5, 0.5])}
 
 
 class Neighbours(NamedTuple):
@@ -92,8 +85,14 @@ def kendall_tau(first: NDArray[np.floating], second: NDArray[np.floating], tau: 
     """Kendall's tau (m,) of one sequence of numbers (n,) with m others (m, n), Eq. 4 of [1]_.
 
     ``tau="a"`` divides by all pairs, ``tau="b"`` is `scipy.stats.kendalltau`; 0 where a divisor is 0.
+
+    Raises
+    ------
+    UsageError : sequences of another length.
     """
-    return _tau(first, 1.0, _orders(second), tau)
+    if second.ndim != 2 or second.shape[1:] != first.shape:
+        raise UsageError(f"sequences of shape {first.shape} and {second.shape}", remedy="(n,) and (m, n)")
+    return _tau(first, _orders(second), _AS_IT_IS[tau])
 
 
 def grid_places(extent: tuple[float, float, float, float], size: float) -> Array:
@@ -108,12 +107,15 @@ def grid_places(extent: tuple[float, float, float, float], size: float) -> Array
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SequenceMap:
-    """Location sequences of m places (m, 2) m over n access points, packed; made by `from_positions`."""
+    """Location sequences of m places (m, 2) m over n access points, packed; made by `from_positions`.
+
+    orders (rows, m): as `_rank_kernels.tau_of_places` takes them.
+    """
 
     places: Array
     n_aps: int
     tau: Tau
-    orders: _Orders
+    orders: NDArray[np.uint64]
 
     def similarity(self, rssi: NDArray[np.floating]) -> Array:
         """(m,) sim = (1 + tau) / 2 in [0, 1] of a scan (n,) dBm, NaN where unheard, with each place."""
@@ -121,7 +123,7 @@ class SequenceMap:
             raise UsageError(
                 f"a scan of shape {rssi.shape}", remedy=f"one value per access point ({self.n_aps})"
             )
-        return _tau(rssi, -1.0, self.orders, self.tau, 0.5, 0.5)
+        return _tau(rssi, self.orders, _SIMILARITY[self.tau])
 
     def neighbours(self, rssi: NDArray[np.floating], k: int) -> Neighbours:
         """The k places most similar to a scan, weighted by their similarity."""
@@ -197,35 +199,32 @@ def _ranks(keys: Array) -> NDArray[np.int64]:
     return np.asarray(1 + (keys[:, None, :] < keys[:, :, None]).sum(axis=2), dtype=np.int64)
 
 
-def _orders(keys: NDArray[np.floating]) -> _Orders:
-    """Pair bits of m sequences of numbers (m, n), smallest first."""
+def _orders(keys: NDArray[np.floating]) -> NDArray[np.uint64]:
+    """Pair bits of m sequences of numbers (m, n), smallest first, as `tau_of_places` takes them."""
     first, second = np.triu_indices(keys.shape[1], 1)
     a, b = keys[:, first], keys[:, second]
-    ordered = np.asarray((a != b).sum(axis=1), np.int64)
-    ahead = _pack(a < b)
-    behind = _pack(a > b) if np.any(ordered < a.shape[1]) else np.empty((0, len(keys)), np.uint64)
-    return _Orders(ahead, behind, ordered)
+    ordered = (a != b).sum(axis=1, dtype=np.uint64)
+    if np.all(ordered == a.shape[1]):
+        return _pack(a < b)
+    return np.vstack([_pack(a < b), _pack(a > b), ordered])
 
 
 def _pack(bits: NDArray[np.bool_]) -> NDArray[np.uint64]:
-    words = -(-bits.shape[1] // _WORD)
+    words = max(-(-bits.shape[1] // _WORD), 1)
     padded = np.zeros((len(bits), words * _WORD), dtype=np.bool_)
     padded[:, : bits.shape[1]] = bits
     packed = np.packbits(padded, axis=1, bitorder="little").view("<u8")
     return np.ascontiguousarray(packed.T, dtype=np.uint64)
 
 
-def _tau(
-    keys: NDArray[np.floating], sign: float, many: _Orders, tau: Tau, scale: float = 1.0, shift: float = 0.0
-) -> Array:
-    """shift + scale tau (m,) of sign times keys (n,), smallest first, with m: Eq. 4 of [1]_, tau-b of [2]_."""
-    ahead, behind, ordered = many
-    out = np.empty(len(ordered))
-    if keys.dtype != np.float64 or not keys.flags.carray:
+def _tau(keys: NDArray[np.floating], orders: NDArray[np.uint64], numbers: Array) -> Array:
+    """Shift + scale tau (m,) of keys (n,) with m sequences: Eq. 4 of [1]_, tau-b of [2]_."""
+    out = np.empty(orders.shape[1])
+    if keys.dtype is not _FLOAT or not keys.flags.carray:
         keys = np.require(keys, np.float64, ("C", "W"))  # one type, one compiled version
     if COMPILED:
-        tau_of_places(keys, sign, ahead, behind, ordered, tau == "b", scale, shift, out)
+        tau_of_places(keys, orders, numbers, out)
     else:
         with np.errstate(over="ignore"):  # counting bits multiplies modulo 2^64
-            tau_of_places(keys, sign, ahead, behind, ordered, tau == "b", scale, shift, out)
+            tau_of_places(keys, orders, numbers, out)
     return out
