@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import io
 import os
 import signal
 import subprocess
 import sys
 import time
+import zipfile
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -23,7 +25,7 @@ from wayfuse.service.server import Server, SiteFiles
 from wayfuse.service.settings import Settings
 from wayfuse.storage.log import last_seq
 
-__all__ = ["App", "Running", "running", "started", "wait_until"]
+__all__ = ["App", "Running", "packed", "running", "started", "wait_until"]
 
 _START_S = 60.0
 _BEGUN: Counter[Path] = Counter()  # servers begun in this process, by their folder
@@ -59,6 +61,15 @@ def wait_until(is_so: Any, seconds: float = 60.0) -> None:
     while not is_so():
         assert time.monotonic() < end, "waited in vain"
         time.sleep(0.02)
+
+
+def packed(folder: Path, prefix: str = "") -> bytes:
+    """A ZIP archive of a folder."""
+    out = io.BytesIO()
+    with zipfile.ZipFile(out, "w") as archive:
+        for path in sorted(p for p in folder.rglob("*") if p.is_file()):
+            archive.write(path, f"{prefix}{path.relative_to(folder)}")
+    return out.getvalue()
 
 
 @contextmanager

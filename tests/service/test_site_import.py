@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from service_running import App, started
+from service_running import App, packed, started
 
 from wayfuse.cli.site import IMPORTERS as OF_THE_COMMAND
 from wayfuse.core.errors import MapError
@@ -18,14 +18,6 @@ from wayfuse.service.replay import envelopes
 from wayfuse.service.routes.sites import Format
 from wayfuse.service.uploaded_sites import FORMATS, UploadedSites, read_upload
 from wayfuse.service.wire import encode
-
-
-def _packed(folder: Path, prefix: str = "") -> bytes:
-    out = io.BytesIO()
-    with zipfile.ZipFile(out, "w") as archive:
-        for path in sorted(p for p in folder.rglob("*") if p.is_file()):
-            archive.write(path, f"{prefix}{path.relative_to(folder)}")
-    return out.getvalue()
 
 
 def _post(app: App, body: bytes, scope: str = "admin", **query: Any) -> Any:
@@ -77,7 +69,7 @@ def test_an_imported_site_is_served_and_tracks_at_once_and_after_a_restart(
 def test_a_server_begins_with_no_site_at_all(world: Any, tmp_path: Path) -> None:
     with started(world, tmp_path, sites=[]) as app:
         assert app.get("/api/v1/sites").json() == {"sites": []}
-        body = _packed(world.folder / "SITE", "SITE/")
+        body = packed(world.folder / "SITE", "SITE/")
         assert _post(app, body, format="wayfuse").json()["site"] == world.site.name
         archive = (world.folder / "map.npz").read_bytes()
         version = app.post("/api/v1/radio-maps", archive, "survey").json()["version"]
@@ -99,13 +91,13 @@ def test_a_server_begins_with_no_site_at_all(world: Any, tmp_path: Path) -> None
 
 
 def test_a_folder_of_plans_comes_as_an_archive(app: App, world: Any) -> None:
-    body = _packed(world.folder / "site", "some folder/")
+    body = packed(world.folder / "site", "some folder/")
     said = _post(app, body, format="ms-indoor", name="Again").json()
     assert [f["floor"] for f in said["floors"]] == list(world.site.floor_names)
 
 
 def test_who_may_not_and_what_is_refused(app: App, world: Any, imdf: bytes) -> None:
-    body = _packed(world.folder / "SITE")
+    body = packed(world.folder / "SITE")
     assert _post(app, body, "survey", format="wayfuse").status_code == 403
     text, _ = app.server.tokens.create({"admin"}, app.server.clock(), site=world.site.name)
     of_one = {"Authorization": f"Bearer {text}"}

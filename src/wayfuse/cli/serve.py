@@ -71,7 +71,7 @@ def serve(
     if token is not None:
         click.echo(f"administrator's token, shown this once: {token}")
     for name in server.worlds:
-        if server.map_in_use(name) is None:
+        if server.in_use(name) is None:
             note = f"note: site {name} has no radio map yet; its phones are refused until one is published"
             click.echo(note, err=True)
         elif server.published(name) is None:

@@ -17,6 +17,7 @@ from wayfuse.service.csi_stream import listen_for_csi
 from wayfuse.service.problems import handle_problems
 from wayfuse.service.routes import (
     admin,
+    anchors,
     inputs,
     outputs,
     pages,
@@ -35,7 +36,7 @@ from wayfuse.service.web.surveys import Surveys
 
 __all__ = ["PARTS", "create_app"]
 
-_ROUTES = (inputs, outputs, stream, sites, admin, pages, zones)
+_ROUTES = (inputs, outputs, stream, sites, anchors, admin, pages, zones)
 _WEB = (web_plan, web_particles, web_radio, web_survey, web_assets)
 PARTS = (*(part.router for part in (*_ROUTES, *_WEB)), web_survey.by_path)
 _log = logging.getLogger(__name__)

@@ -14,6 +14,7 @@ from wayfuse.service.live import profile_json
 from wayfuse.service.message import BadBodyError, Message, Profile
 from wayfuse.service.pipeline import BusyError, Item
 from wayfuse.service.server import Server
+from wayfuse.service.world import Basis
 from wayfuse.storage.log import Entry
 
 __all__ = ["Accepted", "completed", "ingest", "the_site"]
@@ -56,9 +57,11 @@ async def ingest(server: Server, site: str, adapter: str, body: bytes, profile: 
     pipeline = server.pipeline
     if pipeline is None:
         raise BusyError("the server is starting", remedy="send it again in a moment")
-    version = server.map_in_use(site)
-    if version is None:
-        raise UsageError(f"site {site} has no radio map yet", remedy="upload and publish one")
+    basis = server.in_use(site)
+    if basis is None:
+        raise UsageError(
+            f"site {site} has no radio map yet", remedy="upload and publish one, or say where anchors hang"
+        )
     arrived = server.clock()
     profile = await completed(server, adapter, body, profile)
     try:
@@ -69,7 +72,7 @@ async def ingest(server: Server, site: str, adapter: str, body: bytes, profile: 
     except BadBodyError:
         server.metrics.bodies.labels(adapter, "refused").inc()
         raise
-    items = [_item(server, site, adapter, m, profile, version, arrived) for m in messages]
+    items = [_item(server, site, adapter, m, profile, basis, arrived) for m in messages]
     seqs: list[int] = []
     if items:
         try:
@@ -88,11 +91,11 @@ async def ingest(server: Server, site: str, adapter: str, body: bytes, profile: 
 
 
 def _item(
-    server: Server, site: str, adapter: str, message: Message, profile: Profile, version: int, arrived: float
+    server: Server, site: str, adapter: str, message: Message, profile: Profile, basis: Basis, arrived: float
 ) -> Item:
     device = server.pseudonyms.device(message.device)
     track = server.pseudonyms.track(site, message.device, message.session)
-    kept = profile_json(profile, version)
+    kept = profile_json(profile, basis)
     return Item(Entry(0, arrived, site, adapter, device, track, kept, message.body), message)
 
 

@@ -18,7 +18,7 @@ from wayfuse.service.adapters import ADAPTERS
 from wayfuse.service.checkpoint import pack, unpack
 from wayfuse.service.live_track import LiveConfig, LiveTrack, Memory
 from wayfuse.service.message import BadBodyError, Message, Profile
-from wayfuse.service.world import World
+from wayfuse.service.world import Basis, World
 from wayfuse.service.zones import Crossing, ZoneState
 from wayfuse.storage.log import Entry
 from wayfuse.storage.tracks import Checkpoint, TrackRow
@@ -61,14 +61,16 @@ class Applied(NamedTuple):
     crossings: tuple[Crossing, ...] = ()
 
 
-def profile_json(profile: Profile, map_version: int) -> str:
+def profile_json(profile: Profile, basis: Basis) -> str:
     """What the log keeps beside a body: no names, those are pseudonyms in their own columns."""
-    return _kept_json(profile.platform, profile.standardised, map_version)
+    return _kept_json(profile.platform, profile.standardised, basis)
 
 
 @lru_cache(64)
-def _kept_json(platform: str, standardised: bool, map_version: int) -> str:
-    kept = {"platform": platform, "standardised": standardised, "map": map_version}
+def _kept_json(platform: str, standardised: bool, basis: Basis) -> str:
+    kept = {"platform": platform, "standardised": standardised, "map": basis.map_version}
+    if basis.anchor_version:
+        kept["anchors"] = basis.anchor_version
     return json.dumps(kept, separators=(",", ":"))
 
 
@@ -164,9 +166,13 @@ class Live:
         """The track of an entry: in memory, from its checkpoint, or new."""
         held = self._held.get(entry.track) or self._load(entry.track)
         if held is None:
-            version = int(json.loads(entry.profile)["map"])
-            row = TrackRow(entry.track, entry.site, entry.device, version, entry.arrived, entry.arrived)
-            tracker = self._worlds[entry.site].tracker(version)
+            said = json.loads(entry.profile)
+            basis = Basis(int(said["map"]), int(said.get("anchors", 0)))
+            row = TrackRow(
+                entry.track, entry.site, entry.device, basis.map_version, entry.arrived, entry.arrived
+            )
+            row = row._replace(anchor_version=basis.anchor_version)
+            tracker = self._worlds[entry.site].tracker(*basis)
             held = _Held(row, LiveTrack(tracker, entry.track, self._seed, self._config))
             self._held[entry.track] = held
         return held
@@ -189,7 +195,7 @@ class Live:
             self.counts["checkpoints of another version"] += 1
             _log.warning("track %s begins anew: %s", track, error)
             return None
-        tracker = self._worlds[row.site].tracker(row.map_version)
+        tracker = self._worlds[row.site].tracker(row.map_version, row.anchor_version)
         return _Held(
             row, LiveTrack.recall(tracker, memory, self._config), is_dirty=False, zones=zones, seq=seq
         )

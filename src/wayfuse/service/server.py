@@ -17,6 +17,7 @@ from wayfuse.core.errors import ConfigError, RadioMapError, UsageError
 from wayfuse.maps.site import Site
 from wayfuse.presets.methods import CONFIGS, FIXES
 from wayfuse.radio.walk_survey import load
+from wayfuse.service.anchors_in_use import AnchorsInUse
 from wayfuse.service.events import Event, Hub
 from wayfuse.service.identity import Pseudonyms, load_key
 from wayfuse.service.limits import RateLimit
@@ -30,8 +31,9 @@ from wayfuse.service.security import Authority
 from wayfuse.service.settings import Settings
 from wayfuse.service.site_anchors import read_site_anchors
 from wayfuse.service.uploaded_sites import UploadedSites
-from wayfuse.service.world import NO_MAP, World, survey_of
+from wayfuse.service.world import NO_MAP, Basis, World, survey_of
 from wayfuse.service.zones import Zone, read_geofences
+from wayfuse.storage.anchors import AnchorStore
 from wayfuse.storage.audit import AuditLog
 from wayfuse.storage.database import open_database, take_lease
 from wayfuse.storage.devices import DeviceStore
@@ -104,6 +106,8 @@ class Server:
             read_geofences(Path(settings.geofences), plans) if settings.geofences else {}
         )
         files_of = {site.name: files for site, files in given}
+        anchors = {site.name: read_site_anchors(files.folder, site) for site, files in given}
+        self.anchors = AnchorsInUse(AnchorStore(self.engine), anchors)
         self.given = frozenset(files_of)  # sites of the command line: they are changed there
         for site in plans.values():
             self.worlds[site.name] = self.world_of(site, files_of.get(site.name))
@@ -136,12 +140,16 @@ class Server:
             method=self.settings.method,
             n_particles=self.settings.particles,
             fences=self._fences.get(site.name, ()),
-            anchors=None if files is None else read_site_anchors(files.folder, site),
+            anchors=lambda version: self.anchors.of(site, version),
         )
-        version_in_use = self._in_use(world)
-        if version_in_use is not None:
-            world.tracker(version_in_use)  # now, not when the first phone waits
+        self.make_ready(world)
         return world
+
+    def make_ready(self, world: World) -> None:
+        """Build what tracks that begin now go by: now, not when the first phone waits."""
+        basis = self._in_use(world)
+        if basis is not None:
+            world.tracker(*basis)
 
     def add_radio_map(self, site: Site, archive: bytes, actor: str, note: str) -> int:
         """Check and keep a radio map; its version.
@@ -161,13 +169,16 @@ class Server:
             self._published[site] = self.sites.published(site)
         return self._published[site]
 
-    def map_in_use(self, site: str) -> int | None:
-        """What tracks that begin now go by: the version published, else `NO_MAP` where there are anchors, else None."""
+    def in_use(self, site: str) -> Basis | None:
+        """What tracks that begin now go by: the map published, else `NO_MAP` where there are anchors, else None."""
         return self._in_use(self.worlds[site])
 
-    def _in_use(self, world: World) -> int | None:
-        version = self.published(world.site.name)
-        return NO_MAP if version is None and world.anchors is not None else version
+    def _in_use(self, world: World) -> Basis | None:
+        name = world.site.name
+        version, anchors = self.published(name), self.anchors.version(name)
+        if version is None and world.anchors(anchors) is None:
+            return None
+        return Basis(NO_MAP if version is None else version, anchors)
 
     def publish(self, site: str, version: int, actor: str) -> None:
         """Put a version of a radio map to use, for tracks that begin from now on.
@@ -179,7 +190,7 @@ class Server:
         self.sites.publish(site, version, self.clock(), actor)
         self._published[site] = version
         if site in self.worlds:
-            self.worlds[site].tracker(version)  # now, not when the first phone waits
+            self.make_ready(self.worlds[site])
         self.audit.add(self.clock(), actor, "publish radio map", site, f"version {version}")
 
     def roll_back(self, site: str, actor: str) -> int:

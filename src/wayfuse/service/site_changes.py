@@ -11,6 +11,7 @@ from wayfuse.service.pipeline import BusyError
 from wayfuse.service.problems import Problem
 from wayfuse.service.server import Server
 from wayfuse.service.world import World
+from wayfuse.storage.anchors import NONE
 
 __all__ = ["add_site", "remove_site"]
 
@@ -58,6 +59,8 @@ def remove_site(server: Server, name: str, actor: str) -> None:
         _check_empty(server, name)
         server.uploads.remove(name)
         del server.worlds[name]
+        if server.anchors.files(name) != NONE:  # they may not fit what is imported under this name next
+            server.anchors.put(name, NONE, server.clock())
 
     _between(server, take)
     server.audit.add(server.clock(), actor, "remove site", name)

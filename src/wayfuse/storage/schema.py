@@ -22,6 +22,7 @@ from sqlalchemy import (
 
 __all__ = [
     "METADATA",
+    "anchors",
     "audit",
     "checkpoints",
     "counters",
@@ -85,6 +86,18 @@ publications = Table(
     ForeignKeyConstraint(["site", "version"], ["radio_maps.site", "radio_maps.version"]),
 )
 
+# the newest version of a site is in use; one whose files are empty says that there are no anchors any more
+anchors = Table(
+    "anchors",
+    METADATA,
+    Column("site", Text, primary_key=True),
+    Column("version", Integer, primary_key=True, autoincrement=False),
+    _double("added"),
+    Column("places", LargeBinary, nullable=False),
+    Column("channel", LargeBinary, nullable=False),
+    ForeignKeyConstraint(["site"], ["sites.name"]),
+)
+
 # seq is given by the writer, without gaps in what was committed, and orders everything a server does
 ingest_log = Table(
     "ingest_log",
@@ -110,6 +123,9 @@ tracks = Table(
     _integer("map_version"),
     _double("started"),
     _double("heard"),
+    Column(
+        "anchor_version", Integer, nullable=False, server_default="0"
+    ),  # 0: none, or those of the site's folder
     Index("ix_tracks_heard", "heard"),
     Index("ix_tracks_device", "device"),
 )

@@ -24,7 +24,8 @@ _COLUMNS = [estimates.c[name] for name in Estimate._fields]
 
 
 class TrackRow(NamedTuple):
-    """A track: its pseudonym, site and phone, the version of the radio map it is tracked with, and when (Unix s)."""
+    """A track: its pseudonym, site and phone, the versions of the radio map and of the anchors it is tracked with, and
+    when (Unix s)."""
 
     track: str
     site: str
@@ -32,6 +33,7 @@ class TrackRow(NamedTuple):
     map_version: int
     started: float
     heard: float
+    anchor_version: int = 0
 
 
 class Checkpoint(NamedTuple):

@@ -82,6 +82,7 @@ class TrackSummary(BaseModel):
     map_version: int
     started: float
     heard: float
+    anchor_version: int
     is_live: bool
     is_ended: bool = False
     estimates: int = 0
@@ -96,12 +97,16 @@ class Tracks(BaseModel):
 
 
 class SiteSummary(BaseModel):
-    """A site. radio_map : version in use, null for none. tracks : how many are in memory."""
+    """A site. radio_map : version in use, null for none. tracks : how many are in memory. anchors : how many have a
+    place. channel_anchors : how many have a channel model.
+    """
 
     name: str
     levels: list[str]
     radio_map: int | None
     tracks: int
+    anchors: int
+    channel_anchors: int
 
 
 class Sites(BaseModel):

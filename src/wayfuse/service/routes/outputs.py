@@ -19,6 +19,7 @@ from wayfuse.service.problems import Problem, responses
 from wayfuse.service.routes.answers import Position, Positions, Sites, Tracks, TrackSummary, answer
 from wayfuse.service.routes.sent_file import sent_file
 from wayfuse.service.server import Server
+from wayfuse.service.world import World
 from wayfuse.storage.tokens import Token
 from wayfuse.storage.tracks import TrackRow
 
@@ -40,19 +41,22 @@ _WRITERS = {"gpx": to_gpx, "mf-json": to_mf_json}
 
 @router.get("/sites", summary="Sites that are served", responses=answer(Sites), response_model=None)
 def sites(request: Request, token: Reader) -> dict[str, Any]:
-    """Names, levels and versions of the radio maps."""
+    """Names, levels, versions of the radio maps, and how many anchors there are."""
     server = server_of(request)
+    seen = [world for name, world in list(server.worlds.items()) if token.site in {"", name}]
+    return {"sites": [_site(server, world) for world in seen]}
+
+
+def _site(server: Server, world: World) -> dict[str, Any]:
+    name = world.site.name
+    anchors = world.anchors(server.anchors.version(name))
     return {
-        "sites": [
-            {
-                "name": name,
-                "levels": list(world.site.floor_names),
-                "radio_map": server.published(name),
-                "tracks": len(server.live.views(name)),
-            }
-            for name, world in list(server.worlds.items())
-            if token.site in {"", name}
-        ]
+        "name": name,
+        "levels": list(world.site.floor_names),
+        "radio_map": server.published(name),
+        "tracks": len(server.live.views(name)),
+        "anchors": 0 if anchors is None else len(anchors.places),
+        "channel_anchors": 0 if anchors is None else len(anchors.modelled),
     }
 
 

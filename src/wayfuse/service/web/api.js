@@ -29,12 +29,14 @@ async function request(path, query, options) {
 
 export const get = async (path, query = {}, signal = undefined) => (await request(path, query, { signal })).json();
 
-export async function post(path, query, body) {
+async function send(method, path, query, body) {
   const isFile = body instanceof Blob;
-  const options = { method: "POST", body: isFile ? body : JSON.stringify(body ?? {}) };
-  options.headers = { "Content-Type": isFile ? "application/octet-stream" : "application/json" };
-  return (await request(path, query, options)).json();
+  const headers = { "Content-Type": isFile ? "application/octet-stream" : "application/json" };
+  return (await request(path, query, { method, headers, body: isFile ? body : JSON.stringify(body ?? {}) })).json();
 }
+
+export const post = (path, query, body) => send("POST", path, query, body);
+export const put = (path, query, body) => send("PUT", path, query, body);
 
 /** Save an answer as a file of a name. */
 export async function save(path, query, name) {

@@ -4,6 +4,7 @@ import { get, post, remove } from "/web/api.js";
 import { action, ago, el, metres, percent, trying } from "/web/dom.js";
 import { collection, feature } from "/web/frames.js";
 import { store } from "/web/store.js";
+import { startAnchors } from "/web/survey_anchors.js";
 import { startPictures } from "/web/survey_pictures.js";
 import { startRecord } from "/web/survey_record.js";
 import { startImport } from "/web/survey_site.js";
@@ -41,7 +42,8 @@ export function startSurvey(view, map, imported) {
   const versions = startVersions(() => pictures.again());
   const builder = startBuilder(ask, versions.list);
   const pictures = startPictures(map);
-  const building = startImport(imported);
+  const anchors = startAnchors();
+  const building = startImport(imported, anchors.element);
   view.append(said, pictures.element, record.element, parts.element, builder.element, versions.element, building.element);
 
   const tried = trying(said);
@@ -50,12 +52,14 @@ export function startSurvey(view, map, imported) {
   store.on("site", () => open && opened());
   const opened = async () => {
     open = true;
+    anchors.element.hidden = !store.site;
     if (!store.site) {
       building.open();
       return;
     }
     await tried(ask);
     await tried(versions.list);
+    await tried(anchors.list);
     await pictures.again();
   };
   const left = () => {

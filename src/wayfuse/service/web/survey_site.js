@@ -13,8 +13,8 @@ const FORMATS = {
   wayfuse: "Folder of wayfuse site import (.zip)",
 };
 
-/** imported(name): a site was imported. */
-export function startImport(imported) {
+/** imported(name): a site was imported. anchors: the element in which those of the site are changed. */
+export function startImport(imported, anchors) {
   const format = el("select", { id: "plan-format" }, ...Object.entries(FORMATS).map(([value, textContent]) => el("option", { value, textContent })));
   const file = el("input", { type: "file", id: "plan-file", aria: { label: "Floor plans" } });
   const name = el("input", { type: "text", id: "plan-name", placeholder: "as the plan says", maxLength: 100, spellcheck: false });
@@ -39,6 +39,7 @@ export function startImport(imported) {
       el("label", { htmlFor: "plan-name", textContent: "Name" }), name,
       el("label", { className: "choices" }, replace, "in place of the one of this name"),
       start, warnings,
-      el("p", { className: "small", textContent: "It takes a token with the scope admin. As soon as there is a second building, phones have to say which they mean: make their push addresses here." })));
+      el("p", { className: "small", textContent: "It takes a token with the scope admin. As soon as there is a second building, phones have to say which they mean: make their push addresses here." })),
+    anchors);
   return { element, open: () => { element.querySelector("details").open = true; } };
 }
