@@ -7,7 +7,7 @@ STAMP := $(VENV)/.wayfuse-setup
 WEB := src/wayfuse/service/web
 PAGE := $(WEB)/assets/built.sha256.txt
 
-.PHONY: setup web demo test test-fast check lint types imports cov results bench clean
+.PHONY: setup sionna web demo test test-fast check lint types imports cov results bench clean
 
 setup: $(STAMP) $(PAGE)
 
@@ -17,6 +17,10 @@ $(STAMP): pyproject.toml uv.lock
 	$(VENV)/bin/python -m pip install --quiet --disable-pip-version-check uv==$(UV_VERSION)
 	UV_PROJECT_ENVIRONMENT=$(VENV) $(VENV)/bin/uv sync --locked --inexact --quiet --python $(VENV)/bin/python
 	@touch $@
+
+# the ray tracer of `wayfuse simulate`, an optional extra; it needs an LLVM library too (Debian: libllvm19)
+sionna: setup
+	UV_PROJECT_ENVIRONMENT=$(VENV) $(VENV)/bin/uv sync --locked --inexact --quiet --extra sionna --python $(VENV)/bin/python
 
 # what the page of `wayfuse serve` loads besides its own files: the map library, from npm, as locked
 web: $(PAGE)

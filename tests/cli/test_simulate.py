@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from ray_tracing import skip_without_tracer
 from wayfuse import __version__
 from wayfuse.evaluation.estimates_file import read_estimates
 from wayfuse.formats.reading import read, sniff
@@ -175,6 +176,8 @@ def test_help_names_the_scenarios_that_come_with_the_package(run_cli):
 @pytest.mark.slow
 @pytest.mark.parametrize("name", shipped_scenarios())
 def test_scenarios_that_come_with_the_package_can_be_tracked(name, tmp_path, run_cli):
+    if name == "ray-traced-house":
+        skip_without_tracer()
     out = tmp_path / name
     steps = (
         ("simulate", name, "--out", out),

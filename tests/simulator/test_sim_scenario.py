@@ -99,6 +99,11 @@ def test_values_change_and_keep_their_kind(tmp_path):
         ("[radio]\nshadow_m = 0.0", "shadow_m"),
         ("[radio]\naccess_points = 3", "radio.access_points: 3 .*a list in brackets"),
         ("[radio]\nmodel = 'images'\nceiling = 1.0", "ceiling"),
+        ("[radio]\nmodel = 'rays'\nceiling = 2.9", "ceiling"),
+        ("[radio.rays]\nwall_material = 'paper'", "brick"),
+        ("[radio.rays]\nraster_m = 0.0", "raster_m"),
+        ("[radio.rays]\ninteractions = 21", "interactions"),
+        ("[radio.rays]\nsamples = 10", "samples"),
         ("radio = 3", "radio: 3 .*a table belongs here"),
         ("[seed]\na = 1", "a table where a value belongs"),
         ("seed = -1", "seed = -1"),
@@ -126,9 +131,14 @@ def test_mistakes_are_named(tmp_path, text, said):
 
 def test_scenarios_that_come_with_the_package_are_found_by_name_and_read():
     names = shipped_scenarios()
-    assert {"house-two-phones", "throttled-phone", "moved-access-points", "warehouse-rtt", "csi-room"} <= set(
-        names
-    )
+    assert {
+        "house-two-phones",
+        "throttled-phone",
+        "moved-access-points",
+        "warehouse-rtt",
+        "csi-room",
+        "ray-traced-house",
+    } <= set(names)
     for name in names:
         assert load_scenario_file(find_scenario(name)).title
     with pytest.raises(DataMissingError, match="house-two-phones"):

@@ -35,14 +35,14 @@ def simulate(
     """Simulate a SCENARIO: walkers with phones in a building, what the phones record, and the truth.
 
     SCENARIO is a TOML file, or the name of one that comes with wayfuse: csi-room, house-two-phones,
-    moved-access-points, throttled-phone, warehouse-rtt. docs/simulator.md has every key.
+    moved-access-points, ray-traced-house, throttled-phone, warehouse-rtt. docs/simulator.md has every key.
 
     DIR gets the site, recordings of survey walks (with waypoints) and of walks to track (without), the places of the
     access points, and the truth: DIR/truth.csv, and DIR/truth for `wayfuse evaluate`.
     """
     import json
 
-    from wayfuse.cli.work import map_recordings
+    from wayfuse.cli.work import map_recordings, progress_bar
     from wayfuse.simulator.experiment import make_world, plan_walks
     from wayfuse.simulator.experiment_files import check_formats, write_tables
     from wayfuse.simulator.scenario_file import find_scenario, load_scenario_file
@@ -51,7 +51,7 @@ def simulate(
     file = load_scenario_file(source)
     _claim(out)
     used = file.seed if seed is None else seed
-    site, world = make_world(file, used, source.parent)
+    site, world = make_world(file, used, source.parent, progress_bar("tracing rays"))
     plans = plan_walks(world)
     check_formats(world, plans)
     _write_world(out, world, source.read_text(encoding="utf-8"))

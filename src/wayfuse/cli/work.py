@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import TypeVar
 
@@ -12,7 +12,7 @@ import click
 
 from wayfuse.core.errors import UsageError
 
-__all__ = ["check_target", "map_recordings", "report_faults"]
+__all__ = ["check_target", "map_recordings", "progress_bar", "report_faults"]
 
 T = TypeVar("T")
 
@@ -44,6 +44,16 @@ def map_recordings(
             for result in pool.map(_run, paths[1:], chunksize=1):
                 yield result  # type: ignore[misc]  # what ``work`` returned
                 bar.update(1)
+
+
+def progress_bar(label: str) -> Callable[[Iterable[T], int], Iterator[T]]:
+    """Passes results on as they come, told how many there will be, with a progress bar on standard error."""
+
+    def shown(results: Iterable[T], n: int) -> Iterator[T]:
+        with click.progressbar(results, length=n, label=label, file=sys.stderr) as bar:
+            yield from bar
+
+    return shown
 
 
 def report_faults(notes: Sequence[str]) -> None:

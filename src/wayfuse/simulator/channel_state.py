@@ -1,8 +1,9 @@
 """Channel state as an Intel 5300 card reports it: 30 groups of subcarriers of a 20 MHz channel, levelled, in 8 bits.
 
 The card's gain control brings the strongest part to the same size whatever the level; RSSI per antenna and the gain
-say what the level was. Its sampling starts at a random moment and phase. The channel (`wayfuse.simulator.multipath`)
-is drawn anew every ``coherence_m`` of the walk.
+say what the level was. Its sampling starts at a random moment and phase. Every ``coherence_m`` of the walk the channel
+is drawn anew (`wayfuse.simulator.multipath`), or taken anew from the rays where they were traced
+(`wayfuse.simulator.rays`); packets are lost where no ray arrives.
 """
 
 from __future__ import annotations
@@ -96,7 +97,7 @@ def _packets(
 ) -> list[CsiFrame]:
     """Packets of one radio at times t (n,)."""
     xy = np.column_stack([np.interp(t, walk.t, walk.xy[:, k]) for k in (0, 1)])
-    every, ap = np.full(len(t), radio), radios.ap[radio]
+    every = np.full(len(t), radio)
     level = level_at(walk, radios, every, xy, t)
     grid = np.clip(np.searchsorted(walk.t, t), 0, len(walk.t) - 1)
     floor = np.zeros(len(t), dtype=np.int64) if walk.climb is None else walk.climb.floor[grid]
@@ -105,16 +106,22 @@ def _packets(
     frames, taps, drawn_at = [], None, -np.inf
     for k in np.flatnonzero(level >= model.weakest_dbm).tolist():
         if taps is None or gone[k] - drawn_at >= model.coherence_m:
-            taps, drawn_at = _taps(radios, int(ap), xy[k], int(floor[k]), model, rng), gone[k]
+            taps, drawn_at = _taps(radios, radio, xy[k], int(floor[k]), model, rng), gone[k]
+        if taps is None:
+            continue
         h = response(taps, _OFFSETS, 1e6 * float(radios.frequency[radio]), model.n_antennas)
         frames.append(through_card(h, float(level[k]), float(t[k]), anchor, model, rng))
     return frames
 
 
 def _taps(
-    radios: RadioField, ap: int, xy: Array, floor: int, model: ChannelModel, rng: np.random.Generator
-) -> Taps:
-    """The channel at a place: the direct path is weaker behind walls."""
+    radios: RadioField, radio: int, xy: Array, floor: int, model: ChannelModel, rng: np.random.Generator
+) -> Taps | None:
+    """The channel at a place: the direct path is weaker behind walls. None: no ray arrives."""
+    if radios.rays is not None:
+        taps = radios.rays.channels[floor].taps(radio, xy)
+        return None if taps is None else taps._replace(delay=taps.delay - taps.delay.min())
+    ap = int(radios.ap[radio])
     one = np.array([ap])
     n_walls = float(radios.walls_between(one, xy[None], floor).sum() + radios.slabs(one, xy[None], floor)[0])
     to = radios.ap_xy[ap] - xy

@@ -7,8 +7,10 @@ far.
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -34,6 +36,7 @@ from wayfuse.simulator.simulate import SimulatedSite, site_in
 from wayfuse.simulator.simulate_journey import JourneyTruth, Phone, go, record
 from wayfuse.simulator.site_building import building_of
 from wayfuse.simulator.storeys import three_storeys
+from wayfuse.simulator.traced_site import traced
 from wayfuse.simulator.walker import Person, Walk, draw_person
 
 __all__ = ["Plan", "SimulatedWalk", "World", "make_world", "plan_walks", "simulate_plan"]
@@ -86,8 +89,18 @@ class SimulatedWalk:
     places: tuple[Waypoint, ...]
 
 
-def make_world(scenario: ScenarioFile, seed: int, folder: Path) -> tuple[Site, World]:
-    """Draw the world; ``folder`` is that of the scenario's file, from which a site folder counts.
+def make_world(
+    scenario: ScenarioFile,
+    seed: int,
+    folder: Path,
+    progress: Callable[[Iterable[Any], int], Iterable[Any]] = lambda done, _: done,
+) -> tuple[Site, World]:
+    """Draw the world.
+
+    Parameters
+    ----------
+    folder : that of the scenario's file, from which a site folder counts.
+    progress : passes parts of long work on as they come; it is told how many there will be.
 
     Raises
     ------
@@ -111,6 +124,8 @@ def make_world(scenario: ScenarioFile, seed: int, folder: Path) -> tuple[Site, W
         )
     after_rng = np.random.default_rng((seed, _CHANGES))
     later = replace(before, radios=changed(before.radios, building, change.moved, change.removed, after_rng))
+    if scenario.radio.model == "rays":
+        before, later = traced(before, later, scenario.csi, seed, progress)
     return site, World(scenario, seed, before, later, shift, georeferenced)
 
 

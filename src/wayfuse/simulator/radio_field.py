@@ -18,6 +18,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from wayfuse.core.errors import UsageError
 from wayfuse.core.types import Array, BoolArray, IdArray, IntArray
 from wayfuse.simulator.building import Building, Storey
 from wayfuse.simulator.chu2009_world import draw_pattern
@@ -25,6 +26,7 @@ from wayfuse.simulator.fields import WaveField, exponential_field
 from wayfuse.simulator.geometry import clearance, crossings, inside
 from wayfuse.simulator.he2014_world import Room as EmptyRoom
 from wayfuse.simulator.he2014_world import strength
+from wayfuse.simulator.rays import RayField, RaysModel
 from wayfuse.simulator.rim import RimModel, pattern_at, rim_level
 from wayfuse.simulator.toml_tables import no_negative, require
 
@@ -50,10 +52,10 @@ class RadioModel:
     """Access points and propagation; pairs are (2.4 GHz, 5 GHz).
 
     model : ``log-distance`` with walls, slabs and shadowing; ``rim``, the model of chu2009 with slabs; ``images``, the
-    rays of an empty room.
+    rays of an empty room; ``rays``, ray tracing in the building (the extra ``sionna``).
     """
 
-    model: str = field(default="log-distance", metadata={"one_of": ("log-distance", "rim", "images")})
+    model: str = field(default="log-distance", metadata={"one_of": ("log-distance", "rim", "images", "rays")})
     access_points: tuple[AccessPoint, ...] = field(default=(), metadata={"of": AccessPoint})  # else random
     aps_per_floor: int = 24  # where they are not given
     ap_height: float = 3.0  # m above the floor
@@ -73,15 +75,16 @@ class RadioModel:
     shadow_m: float = 5.0  # m, decorrelation distance indoors
     shadow_shared: float = 0.6  # share of the variance common to both bands
     rim: RimModel = field(default_factory=RimModel)
-    ceiling: float = 3.5  # m, and
+    ceiling: float = 3.5  # m, of the empty room, and of the top storey for rays
     permittivity: float = 5.0  # relative, of the walls, floor and ceiling of the empty room
+    rays: RaysModel = field(default_factory=RaysModel)
 
     def __post_init__(self) -> None:
         no_negative(self, but=("power_dbm",))
         shares = self.house_share, self.single_band_share, self.shadow_shared
         require("house_share, single_band_share, shadow_shared", max(shares) <= 1.0, shares, "from 0 to 1")
         require("shadow_m", self.shadow_m > 0.0, self.shadow_m, "a positive length in m")
-        fits = self.model != "images" or self.ceiling > max(self.ap_height, PHONE_HEIGHT)
+        fits = self.model not in {"images", "rays"} or self.ceiling > max(self.ap_height, PHONE_HEIGHT)
         require("ceiling", fits, self.ceiling, "above ap_height")
         require("permittivity", self.permittivity >= 1.0, self.permittivity, "at least 1")
 
@@ -109,6 +112,12 @@ class RadioField:
     ap_shadow: WaveField
     radio_shadow: WaveField
     pattern: Array = field(default_factory=lambda: np.empty((0, 360)))
+    rays: RayField | None = None  # of the model ``rays``, once traced (`wayfuse.simulator.traced_site`)
+
+    @property
+    def carrier(self) -> Array:
+        """Carrier (r,) Hz that stands for each radio's band."""
+        return np.array(_CARRIERS)[self.band]
 
     @property
     def n_radios(self) -> int:
@@ -123,6 +132,10 @@ class RadioField:
     def rssi(self, radio: IntArray, xy: Array, floor: int) -> Array:
         """RSSI (m,) dBm of radios (m,) at places (m, 2) m of a floor, the mean over fading."""
         ap, band = self.ap[radio], self.band[radio]
+        if self.model.model == "rays":
+            if self.rays is None:
+                raise UsageError("no rays were traced yet", remedy="simulator.traced_site.traced")
+            return np.asarray(self.power[radio] + self.rays.level(radio, xy, floor))
         if self.model.model == "images":
             return np.asarray(self.power[radio] + self._rays(ap, band, xy))
         slab = np.array(self.model.slab_db)[band] * self.slabs(ap, xy, floor)
