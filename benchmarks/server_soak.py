@@ -243,12 +243,14 @@ def _text(samples: Sequence[Sample], events: int, hours: float, took: float) -> 
     ]
     said = ", ".join(f"{name} {100.0 * (ratio - 1.0):+.1f} %" for name, ratio in growth.items())
     verdict = "no growth" if growth["resident"] <= _MOST_GROWTH else "**it grows**"
+    fullest = max(samples, key=lambda s: s.disk)
     kept_h = 24.0 * float(_SETTINGS["retain_tracks_d"])
     return (
         f"Endurance: {hours:g} h of visitors\n\nVisitors of a simulated site, {samples[-1].batches:,} batches in "
         f"{took / 60.0:.0f} minutes; kept: the log {_SETTINGS['retain_log_h']:g} h, tracks {kept_h:g} h "
         f"(seed {_SEED}). The watcher got {events:,} events. From hour {_SETTLED_H:g} on, last quarter against first: "
-        f"{said}: {verdict} of memory. The file of SQLite does not shrink: it has the size of its fullest hour.\n\n"
+        f"{said}: {verdict} of memory. The files of SQLite were largest in hour {fullest.hour:.1f}, "
+        f"{fullest.disk / 1e6:.0f} MB: what is deleted is given back, but for an eighth, kept for what comes.\n\n"
         + table(("hour", "batches so far", "memory (MB)", "disk (MB)", "tracks in memory", *_TABLES), rows)
     )
 

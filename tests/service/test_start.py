@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 from service_running import started
-from sqlalchemy import text
+from sqlalchemy import insert, text
 
 from wayfuse.core.errors import ConfigError, RadioMapError, UsageError
 from wayfuse.service.replay import envelopes
@@ -20,6 +20,8 @@ from wayfuse.service.run import _listen
 from wayfuse.service.server import Server, SiteFiles, match_radio_maps
 from wayfuse.service.settings import Settings
 from wayfuse.service.wire import encode
+from wayfuse.storage.audit import AuditRow
+from wayfuse.storage.schema import audit
 
 
 def _server(world: Any, data: Path, **settings: Any) -> Server:
@@ -91,6 +93,22 @@ def test_what_is_too_old_is_deleted(world: Any, tmp_path: Path) -> None:
         assert again.get(f"/api/v1/tracks/{track}").status_code == 404
         assert _walk(again, world) == track
         assert next(again.server.log.read()).seq == n
+
+
+def test_the_place_of_what_is_deleted_is_given_back(world: Any, tmp_path: Path) -> None:
+    with started(world, tmp_path) as app:
+        rows = [AuditRow(1.0, "me", "dream", "s", "x" * 1000)._asdict()] * 5000
+        with app.server.engine.begin() as connection:
+            connection.execute(insert(audit), rows)
+
+        def pages() -> int:
+            with app.server.engine.connect() as connection:
+                return int(connection.execute(text("PRAGMA page_count")).scalar_one())
+
+        full = pages()
+        app.server.clean()
+        assert pages() < 0.5 * full
+        assert _features(app, _walk(app, world))
 
 
 def test_a_site_without_radio_map_refuses_until_one_is_published(world: Any, tmp_path: Path) -> None:

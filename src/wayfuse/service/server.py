@@ -7,9 +7,10 @@ import fcntl
 import json
 import os
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from hashlib import sha256
 from pathlib import Path
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 import msgspec
 
@@ -38,12 +39,14 @@ from wayfuse.storage.audit import AuditLog
 from wayfuse.storage.database import open_database, take_lease
 from wayfuse.storage.devices import DeviceStore
 from wayfuse.storage.log import IngestLog, last_seq
+from wayfuse.storage.shrinking import give_back
 from wayfuse.storage.sites import SiteStore
 from wayfuse.storage.tokens import TokenStore
 from wayfuse.storage.tracks import TrackStore
 
 __all__ = ["Server", "SiteFiles", "match_radio_maps"]
 
+T = TypeVar("T")
 _OPERATOR = "operator"  # who acts where the command line does
 
 
@@ -261,11 +264,25 @@ class Server:
         os.close(self._lock)
 
     def clean(self) -> None:
-        """Delete what is older than it may be."""
+        """Delete what is older than it may be, and give back its place on the disk, a bite at a time."""
         now = self.clock()
         self.log.trim(now - 3600.0 * self.settings.retain_log_h, self.tracks.round())
         self.tracks.trim(now - 86_400.0 * self.settings.retain_tracks_d)
         self.audit.trim(now - 86_400.0 * self.settings.retain_audit_d)
+        with suppress(BusyError):  # the server is going down: the next one goes on with it
+            while self.between(lambda: give_back(self.engine)):
+                pass
+
+    def between(self, do: Callable[[], T]) -> T:
+        """Do something between two groups of batches, when no track moves and the database is not written.
+
+        Raises
+        ------
+        BusyError : the server is not working.
+        """
+        if self.pipeline is None:
+            raise BusyError("the server is starting", remedy="send it again in a moment")
+        return self.pipeline.call(do).result()
 
     def forget(self, device: str) -> int:
         """Delete all that is kept of a device, by its pseudonym; how many tracks it had.
@@ -274,9 +291,7 @@ class Server:
         ------
         BusyError : the server is not working.
         """
-        if self.pipeline is None:
-            raise BusyError("the server is starting", remedy="send it again in a moment")
-        gone: set[str] = self.pipeline.call(lambda: self._forget(device)).result()
+        gone = self.between(lambda: self._forget(device))
         if self._loop is not None:
             self._loop.call_soon_threadsafe(self.hub.forget, gone)
         return len(gone)

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable
 
 from wayfuse.core.errors import MapError
 from wayfuse.maps.site import Site
-from wayfuse.service.pipeline import BusyError
 from wayfuse.service.problems import Problem
 from wayfuse.service.server import Server
 from wayfuse.service.world import World
@@ -40,7 +38,7 @@ def add_site(server: Server, site: Site, actor: str, *, replace: bool = False) -
     world = server.world_of(site)
     with _WRITING:
         server.uploads.write(site)  # all that takes long is done before the tracks wait
-        _between(server, lambda: _put(server, world))
+        server.between(lambda: _put(server, world))
     server.audit.add(server.clock(), actor, "import site", site.name)
 
 
@@ -62,7 +60,7 @@ def remove_site(server: Server, name: str, actor: str) -> None:
         if server.anchors.files(name) != NONE:  # they may not fit what is imported under this name next
             server.anchors.put(name, NONE, server.clock())
 
-    _between(server, take)
+    server.between(take)
     server.audit.add(server.clock(), actor, "remove site", name)
 
 
@@ -72,13 +70,6 @@ def _put(server: Server, world: World) -> None:
         _check_empty(server, name)
     server.uploads.put(name)
     server.worlds[name] = world
-
-
-def _between(server: Server, do: Callable[[], None]) -> None:
-    """Do something when no track moves."""
-    if server.pipeline is None:
-        raise BusyError("the server is starting", remedy="send it again in a moment")
-    server.pipeline.call(do).result()
 
 
 def _check_not_given(server: Server, name: str) -> None:
