@@ -137,6 +137,18 @@ def test_weights_of_any_number_of_particles(n: int) -> None:
     )
 
 
+@pytest.mark.parametrize(
+    "n", [1, 2, 7, 8, 9, 17, 128, 129, 137, 500]
+)  # as many as are folded not at all .. twice
+def test_the_greatest_weight_is_found_wherever_it_is(n: int) -> None:
+    x, weights, out = np.zeros(n, np.float32), np.empty(n, np.float32), np.empty(8)
+    for at in range(n):
+        logs = np.linspace(-9.0, -5.0, n, dtype=np.float32)
+        logs[at] = -3.0
+        weigh_block(x, x, logs, weights, out)
+        assert logs[at] == 0.0
+
+
 @pytest.mark.parametrize("seed", range(8))
 def test_ancestors_are_those_of_systematic_resampling(seed: int) -> None:
     rng = np.random.default_rng(seed)

@@ -74,7 +74,8 @@ def sincos32(x: np.float32) -> tuple[np.float32, np.float32]:
 def sincos_turn32(word: np.uint32) -> tuple[np.float32, np.float32]:
     """Sine and cosine of 2 pi (word + 0.5) / 2^32, absolute error below 3e-6."""
     quadrant = np.int32(word >> np.uint32(30))
-    rest = np.float32(np.int32(word & np.uint32(0x3FFFFFFF)) - np.int32(0x20000000))
+    # numba takes the difference of two int32 for an int64, which takes eight instructions to convert
+    rest = np.float32(np.int32(np.int32(word & np.uint32(0x3FFFFFFF)) - np.int32(0x20000000)))
     t = rest * np.float32(1.4629180792671596e-09)  # pi / 2^31: angle from the middle of the quadrant
     z = t * t
     s = t * (

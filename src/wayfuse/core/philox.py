@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wayfuse.core.elementary import log32, sincos_turn32
-from wayfuse.core.jit import kernel
+from wayfuse.core.jit import uncounted_kernel
 from wayfuse.core.types import Array, Array32
 
 __all__ = ["Noise", "box_muller", "philox_words", "track_key"]
@@ -31,9 +31,13 @@ _LOW = np.uint64(0xFFFFFFFF)
 _SHIFT = np.uint64(32)
 
 
-@kernel
+@uncounted_kernel
 def philox_words(
-    key0: np.uint64, key1: np.uint64, c2: np.uint64, c3: np.uint64, out: NDArray[np.uint32]
+    key0: int | np.uint64,
+    key1: int | np.uint64,
+    c2: int | np.uint64,
+    c3: int | np.uint64,
+    out: NDArray[np.uint32],
 ) -> None:
     """Fill ``out`` (4, n) with the Philox4x32-10 words of the counters (i, 0, c2, c3), i = 0 .. n - 1."""
     for i in range(out.shape[1]):
@@ -58,7 +62,7 @@ def philox_words(
         out[3, i] = np.uint32(d)
 
 
-@kernel
+@uncounted_kernel
 def box_muller(words: NDArray[np.uint32], out: Array32) -> None:
     """Fill ``out`` (4, n) with the standard normals of uniform words (4, n)."""
     # u lies on the middles of 2^24 equal parts of (0, 1), so the largest normal is 5.9
@@ -98,13 +102,7 @@ class Noise:
         out = np.empty((4, n), dtype=np.uint32)
         draw = self.draw
         self.draw += 1
-        philox_words(
-            np.uint64(self.key[0]),
-            np.uint64(self.key[1]),
-            np.uint64(draw & 0xFFFFFFFF),
-            np.uint64(draw >> 32),
-            out,
-        )
+        philox_words(*self.key, draw & 0xFFFFFFFF, draw >> 32, out)
         return out
 
     def normals(self, n: int) -> Array32:

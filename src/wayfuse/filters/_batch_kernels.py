@@ -40,17 +40,29 @@ def weigh_block(x: Array32, y: Array32, log_weights: Array32, weights: Array32, 
 
 
 @bounded_kernel
-def _greatest(values: Array32, half: Array32) -> np.float32:
-    # folding in halves is a loop without a chain from one element to the next
-    m = (len(values) + 1) // 2
-    for i in range(m):
-        half[i] = max(values[i], values[len(values) - m + i])
-    while m > 1:
-        k = (m + 1) // 2
-        for i in range(m - k):
-            half[i] = max(half[i], half[k + i])
+def _greatest(values: Array32, eighth: Array32) -> np.float32:
+    # without a chain from one element to the next, but among the few that are left in the end
+    m = (len(values) + 7) // 8
+    _fold(values, eighth, m)
+    if m > 16:
+        k = (m + 7) // 8
+        _fold(eighth[:m], eighth, k)
         m = k
-    return np.float32(half[0])
+    top = eighth[0]
+    for i in range(m):
+        top = max(top, eighth[i])
+    return np.float32(top)
+
+
+@bounded_kernel
+def _fold(values: Array32, out: Array32, m: int) -> None:
+    """The greatest of each of m sets of 8 values (N,), N <= 8 m: one of each of 8 parts of m, which may overlap."""
+    last = len(values) - m
+    a, b, c, d = values[:m], values[min(m, last) :], values[min(2 * m, last) :], values[min(3 * m, last) :]
+    e, f, g = values[min(4 * m, last) :], values[min(5 * m, last) :], values[min(6 * m, last) :]
+    h = values[last:]
+    for i in range(m):
+        out[i] = max(a[i], b[i], c[i], d[i], e[i], f[i], g[i], h[i])
 
 
 @bounded_kernel

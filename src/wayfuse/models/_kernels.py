@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wayfuse.core.elementary import exp32, log32, sincos32
-from wayfuse.core.jit import fast_kernel, kernel
+from wayfuse.core.jit import fast_kernel, kernel, uncounted_kernel
 from wayfuse.core.types import Array, Array32
 
 __all__ = [
@@ -22,7 +22,7 @@ __all__ = [
 ]
 
 
-@kernel
+@uncounted_kernel
 def pdr_move(
     z: Array32,
     x: Array32,

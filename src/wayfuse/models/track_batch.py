@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -20,13 +20,15 @@ from numpy.typing import ArrayLike, NDArray
 from wayfuse.core.errors import ConfigError, UsageError
 from wayfuse.core.types import Array, Array32
 from wayfuse.filters.cloud import Cloud
-from wayfuse.maps.walls import WallArrays, WallIndex
-from wayfuse.models._batch_kernels import tick
+from wayfuse.maps.walls import WallIndex
+from wayfuse.models._batch_kernels import SCRATCH, tick
 from wayfuse.models.motion.pdr import PdrMotion
 from wayfuse.radio.level_table import LANES, LevelTable
 
 __all__ = ["BatchModel", "Seen", "TrackBatch"]
 
+# for a single track, making a type of a name takes as long as looking at an array
+_INT, _SINGLE = np.dtype(np.int64), np.dtype(np.float32)
 _NO_ANCHORS = np.zeros((0, 2), np.float32)
 _NO_LEVELS = LevelTable(np.zeros((0, 4, 3, LANES), np.float32), np.array([0, 0, 1, 2, 2], np.float32), 0)
 _NO_RANGES, _NO_SCANS, _NO_PLACES = (
@@ -47,6 +49,9 @@ class Seen(NamedTuple):
     places: Array | None = None
 
 
+_NOTHING = Seen()
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class BatchModel:
     """What the tracks of a batch have in common.
@@ -54,7 +59,8 @@ class BatchModel:
     Parameters
     ----------
     motion : of steps. walls : None = moves are not tested. penalty : nats lost per blocked move. anchors : (A, 2) m.
-    range_sigma : m. levels : of access points. ess_ratio : resample below this share of N.
+    range_sigma : m. levels : of access points. ess_ratio : resample below this share of N. tables : of a model, as
+    `_batch_kernels.tick` takes them.
     """
 
     motion: PdrMotion = field(default_factory=PdrMotion)
@@ -64,7 +70,7 @@ class BatchModel:
     range_sigma: float = 1.0
     levels: LevelTable = _NO_LEVELS
     ess_ratio: float = 0.5
-    tables: tuple[Array32, WallArrays, Array32] = field(init=False, repr=False)
+    tables: tuple[NDArray[Any], ...] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         if not (self.penalty >= 0.0 and self.range_sigma > 0.0 and 0.0 <= self.ess_ratio <= 1.0):
@@ -78,7 +84,8 @@ class BatchModel:
         numbers = np.array([*sigmas, self.penalty, self.ess_ratio, precision], np.float32)
         walls = self.walls if self.walls is not None else WallIndex.build(np.empty((0, 4)))
         anchors = np.ascontiguousarray(self.anchors, dtype=np.float32)
-        object.__setattr__(self, "tables", (numbers, walls.arrays, anchors))
+        tables = (numbers, *walls.arrays, anchors, self.levels.levels, self.levels.frame)
+        object.__setattr__(self, "tables", tables)
 
     def tick(self, batch: TrackBatch, tracks: ArrayLike, steps: ArrayLike, seen: Seen | None = None) -> Array:
         """Advance some tracks by a step and an observation each, in place.
@@ -97,19 +104,18 @@ class BatchModel:
         ------
         UsageError : shapes that do not fit, a track twice or outside the batch, numbers that are not finite.
         """
-        rows = np.ascontiguousarray(tracks, dtype=np.int64)
-        moves = np.ascontiguousarray(steps, dtype=np.float32)
-        n, seen = len(rows), seen or Seen()
+        rows, moves = np.ascontiguousarray(tracks, _INT), np.ascontiguousarray(steps, _SINGLE)
+        n = len(rows)
         if moves.shape != (n, 2):
             raise UsageError(f"steps of shape {moves.shape}", remedy=f"({n}, 2): m, rad")
-        numbers, walls, anchors = self.tables
-        out = np.empty((n, 8))
+        ranges, scans, places = seen or _NOTHING
+        scratch, out = np.empty(SCRATCH * batch.particles.shape[2], _SINGLE), np.empty((n, 8))
         wrong = tick(
-            batch.particles, batch.log_weights, batch.counters, rows, moves, numbers, *walls, anchors,
-            _NO_RANGES if seen.ranges is None else _of_tracks(seen.ranges, (n, len(anchors)), "ranges"),
-            self.levels.levels, self.levels.frame,
-            _NO_SCANS if seen.scans is None else self.levels.scans(_of_tracks(seen.scans, (n, None), "scans")),
-            _NO_PLACES if seen.places is None else _finite(_of_tracks(seen.places, (n, None, 4), "places")), out,
+            batch.particles, batch.log_weights, batch.counters, scratch, rows, moves,
+            _NO_RANGES if ranges is None else _of_tracks(ranges, (n, len(self.anchors)), "ranges"),
+            _NO_SCANS if scans is None else self.levels.scans(_of_tracks(scans, (n, None), "scans")),
+            _NO_PLACES if places is None else _finite(_of_tracks(places, (n, None, 4), "places")),
+            out, *self.tables,
         )  # fmt: skip
         if wrong >= 0:
             raise UsageError(
@@ -161,12 +167,11 @@ class TrackBatch:
 
 def _of_tracks(values: NDArray[np.floating], shape: tuple[int | None, ...], name: str) -> Array32:
     got = values.shape
-    wanted = (
-        shape if None not in shape else tuple(g if w is None else w for g, w in zip(got, shape, strict=False))
-    )
-    if len(got) != len(shape) or got != wanted:
-        raise UsageError(f"{name} of shape {got}", remedy=f"{shape}, None = any")
-    return np.ascontiguousarray(values, dtype=np.float32)
+    if got != shape:  # or it has places for any number
+        wanted = tuple(g if w is None else w for g, w in zip(got, shape, strict=False))
+        if len(got) != len(shape) or got != wanted:
+            raise UsageError(f"{name} of shape {got}", remedy=f"{shape}, None = any")
+    return np.ascontiguousarray(values, _SINGLE)
 
 
 def _finite(values: Array32) -> Array32:
