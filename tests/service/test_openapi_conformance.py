@@ -35,30 +35,86 @@ def served(world: Any, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Run
         yield server
 
 
+def _tracked(served: Running) -> str:
+    """A track that is live."""
+    with served.client() as client:
+        said = client.post("/api/v1/in/own", json=EXAMPLES["own"]).json()["accepted"][0]
+    served.wait_applied(said["seq"])
+    return str(said["track"])
+
+
+# what drawing does not hit upon: files, identifiers, a site that is not of a folder; test_answers_described has them
+_NEVER_RIGHT = {
+    "DELETE /api/v1/anchors",
+    "DELETE /api/v1/anchors/channel",
+    "DELETE /api/v1/sites",
+    "DELETE /api/v1/survey/parts/{identifier}",
+    "DELETE /api/v1/tokens/{token_id}",
+    "GET /api/v1/survey/heat",
+    "POST /api/v1/in/getsensordata",
+    "POST /api/v1/radio-maps",
+    "POST /api/v1/radio-maps/roll-back",
+    "POST /api/v1/sites",
+    "POST /api/v1/survey/recordings",
+    "POST /api/v1/survey/walks",
+    "PUT /api/v1/anchors",
+    "PUT /api/v1/anchors/channel",
+}
+
+
+def _let_it_be_found(case: schemathesis.Case, track: str) -> None:
+    """Ask for what there is: the site that is meant where none is named, its ground floor, a track, version 1."""
+    known = {"track": track, "floor": 0, "job": 1}
+    for name in case.path_parameters or {}:
+        case.path_parameters[name] = known.get(name, case.path_parameters[name])
+    for name in list(case.query or {}):
+        if name in ("site", "version"):
+            del case.query[name]
+        elif name == "floor":
+            case.query[name] = 0
+
+
+def _failure(
+    served: Running, operation: Any, mode: GenerationMode, how: settings, track: str
+) -> tuple[str, bool]:
+    """What is wrong with answers of an operation to requests that are drawn; whether one of them was right."""
+    is_right = False
+
+    @how
+    @given(case=operation.as_strategy(generation_mode=mode))
+    def check(case: schemathesis.Case) -> None:
+        nonlocal is_right
+        if case.path == "/api/v1/events":
+            case.query["once"] = True  # the stream would go on
+        if mode == GenerationMode.POSITIVE:
+            _let_it_be_found(case, track)
+        headers = {"Authorization": f"Bearer {served.token}"}
+        answer = case.call_and_validate(headers=headers, excluded_checks=_NOT_CHECKED)
+        is_right = is_right or answer.status_code < 300
+
+    try:
+        check()
+    except Unsatisfiable:
+        return "", is_right  # nothing to be wrong about
+    except (AssertionError, BaseExceptionGroup) as error:
+        return f"{operation.label} ({mode.value}): {error}", is_right
+    return "", is_right
+
+
 def _failures(served: Running, how: settings) -> list[str]:
     """What schemathesis finds wrong with answers to requests that it draws, valid ones and others."""
     schema = schemathesis.openapi.from_url(f"{served.address}/openapi.json")
-    found, n = [], 0
+    found, track = [], _tracked(served)
+    drawn, right = set[str](), set[str]()
     for result in schema.get_all_operations():
         operation = result.ok()
-        n += 1
+        drawn.add(operation.label)
         for mode in (GenerationMode.POSITIVE, GenerationMode.NEGATIVE):
-
-            @how
-            @given(case=operation.as_strategy(generation_mode=mode))
-            def check(case: schemathesis.Case) -> None:
-                if case.path == "/api/v1/events":
-                    case.query["once"] = True  # the stream would go on
-                headers = {"Authorization": f"Bearer {served.token}"}
-                case.call_and_validate(headers=headers, excluded_checks=_NOT_CHECKED)
-
-            try:
-                check()
-            except Unsatisfiable:
-                continue  # nothing to be wrong about
-            except (AssertionError, BaseExceptionGroup) as error:
-                found.append(f"{operation.label} ({mode.value}): {error}")
-    assert n > 20
+            failure, is_right = _failure(served, operation, mode, how, track)
+            found += [failure] if failure else []
+            right |= {operation.label} if is_right else set()
+    assert len(drawn) > 40
+    assert drawn - right <= _NEVER_RIGHT
     return found
 
 

@@ -13,6 +13,20 @@ from pydantic import BaseModel, ConfigDict, Field
 from wayfuse.service.access import SCHEME, Admin, Surveyor, allowed, check_all_sites, server_of, site_of
 from wayfuse.service.limits import read_body
 from wayfuse.service.problems import Problem, responses
+from wayfuse.service.routes.answers import answer
+from wayfuse.service.routes.answers_admin import (
+    Audit,
+    Devices,
+    DeviceSummary,
+    Forgotten,
+    InUse,
+    MadeToken,
+    RadioMaps,
+    Revoked,
+    Tokens,
+    TokenSummary,
+    Uploaded,
+)
 from wayfuse.service.routes.sent_file import sent_file
 from wayfuse.service.server import Server
 from wayfuse.service.subject import write_subject
@@ -65,13 +79,20 @@ class Publication(BaseModel):
     version: Annotated[int, Field(ge=1, le=2**31 - 1)]
 
 
-@router.get("/token", summary="What the token of this request may do")
+@router.get(
+    "/token",
+    summary="What the token of this request may do",
+    responses=answer(TokenSummary),
+    response_model=None,
+)
 def own_token(token: Annotated[Token, Depends(allowed(""))]) -> dict[str, Any]:
     """For clients that show only what they can do; any token will do."""
     return _token(token)
 
 
-@router.post("/tokens", status_code=201, summary="Make a token")
+@router.post(
+    "/tokens", status_code=201, summary="Make a token", responses=answer(MadeToken, 201), response_model=None
+)
 def create_token(request: Request, maker: Surveyor, wanted: NewToken) -> dict[str, Any]:
     """The answer holds the token's text, which cannot be asked for again. Who surveys may make tokens with the scope
     ``ingest`` alone, for the phones that survey.
@@ -90,14 +111,14 @@ def create_token(request: Request, maker: Surveyor, wanted: NewToken) -> dict[st
     return {"token": text, **_token(made)}
 
 
-@router.get("/tokens", summary="Tokens, without their texts")
+@router.get("/tokens", summary="Tokens, without their texts", responses=answer(Tokens), response_model=None)
 def tokens(request: Request, admin: Admin) -> dict[str, Any]:
     """Also those that were revoked or have expired."""
     of = [t for t in server_of(request).tokens.all() if admin.site in {"", t.site}]
     return {"tokens": [_token(t) for t in of]}
 
 
-@router.delete("/tokens/{token_id}", summary="Revoke a token")
+@router.delete("/tokens/{token_id}", summary="Revoke a token", responses=answer(Revoked), response_model=None)
 def revoke_token(request: Request, admin: Admin, token_id: str) -> dict[str, Any]:
     """It ends within seconds."""
     server = server_of(request)
@@ -109,7 +130,7 @@ def revoke_token(request: Request, admin: Admin, token_id: str) -> dict[str, Any
     return {"revoked": token_id}
 
 
-@router.put("/devices", summary="Enrol a phone")
+@router.put("/devices", summary="Enrol a phone", responses=answer(DeviceSummary), response_model=None)
 def enrol(request: Request, surveyor: Surveyor, device: NewDevice) -> dict[str, Any]:
     """Says which platform a phone is of, for formats that do not say; again to change it."""
     server = server_of(request)
@@ -120,13 +141,18 @@ def enrol(request: Request, surveyor: Surveyor, device: NewDevice) -> dict[str, 
     return kept._asdict()
 
 
-@router.get("/devices", summary="Enrolled phones")
+@router.get("/devices", summary="Enrolled phones", responses=answer(Devices), response_model=None)
 def devices(request: Request, _: Surveyor) -> dict[str, Any]:
     """By their pseudonyms."""
     return {"devices": [d._asdict() for d in server_of(request).devices.all()]}
 
 
-@router.post("/devices/forget", summary="Delete all that is kept of a phone")
+@router.post(
+    "/devices/forget",
+    summary="Delete all that is kept of a phone",
+    responses=answer(Forgotten),
+    response_model=None,
+)
 def forget(
     request: Request, admin: Admin, name: Annotated[str, Query(min_length=1, max_length=200)]
 ) -> dict[str, Any]:
@@ -164,7 +190,9 @@ def export(
     return answer
 
 
-@router.get("/radio-maps", summary="Versions of a radio map")
+@router.get(
+    "/radio-maps", summary="Versions of a radio map", responses=answer(RadioMaps), response_model=None
+)
 def radio_maps(request: Request, surveyor: Surveyor, site: str = "") -> dict[str, Any]:
     """Oldest first, and which is in use."""
     server = server_of(request)
@@ -177,6 +205,8 @@ def radio_maps(request: Request, surveyor: Surveyor, site: str = "") -> dict[str
     "/radio-maps",
     status_code=201,
     summary="Upload a radio map",
+    responses=answer(Uploaded, 201),
+    response_model=None,
     openapi_extra={
         "requestBody": {
             "required": True,
@@ -197,7 +227,9 @@ async def add_radio_map(
     return {"site": name, "version": version}
 
 
-@router.post("/radio-maps/publish", summary="Put a version to use")
+@router.post(
+    "/radio-maps/publish", summary="Put a version to use", responses=answer(InUse), response_model=None
+)
 def publish(request: Request, surveyor: Surveyor, wanted: Publication, site: str = "") -> dict[str, Any]:
     """Tracks that begin from now on go by it; those under way keep theirs."""
     server = server_of(request)
@@ -206,7 +238,12 @@ def publish(request: Request, surveyor: Surveyor, wanted: Publication, site: str
     return {"site": name, "published": wanted.version}
 
 
-@router.post("/radio-maps/roll-back", summary="Put the version before to use")
+@router.post(
+    "/radio-maps/roll-back",
+    summary="Put the version before to use",
+    responses=answer(InUse),
+    response_model=None,
+)
 def roll_back(request: Request, surveyor: Surveyor, site: str = "") -> dict[str, Any]:
     """The one that was in use before the present one came."""
     server = server_of(request)
@@ -214,7 +251,7 @@ def roll_back(request: Request, surveyor: Surveyor, site: str = "") -> dict[str,
     return {"site": name, "published": server.roll_back(name, surveyor.id)}
 
 
-@router.get("/audit", summary="Who did what")
+@router.get("/audit", summary="Who did what", responses=answer(Audit), response_model=None)
 def audit(
     request: Request, admin: Admin, limit: Annotated[int, Query(ge=1, le=1000)] = 100
 ) -> dict[str, Any]:

@@ -126,6 +126,6 @@ class Inside(BaseModel):
     inside: dict[str, list[str]]
 
 
-def answer(model: type[BaseModel]) -> dict[int | str, dict[str, Any]]:
+def answer(model: type[BaseModel], status: int = 200) -> dict[int | str, dict[str, Any]]:
     """The answer of a route that is right; to be used with ``response_model=None``."""
-    return {200: {"model": model}}
+    return {status: {"model": model}}

@@ -35,6 +35,7 @@ Time = Annotated[float | None, Query(description="s, of the phone's clock.", all
 _MOST = 10_000
 _TRACK = re.compile("[0-9a-f]{16}")  # databases refuse some characters
 _MEDIA = {"csv": "text/csv; charset=utf-8", "gpx": "application/gpx+xml", "mf-json": "application/geo+json"}
+_KIND = {"csv": "string", "gpx": "string", "mf-json": "object"}  # of a body, to JSON Schema
 _PARQUET = "application/vnd.apache.parquet"
 _WRITERS = {"gpx": to_gpx, "mf-json": to_mf_json}
 
@@ -142,7 +143,7 @@ def estimates(
     summary="A track as a file",
     response_class=Response,
     responses=responses(404)
-    | {200: {"content": {media: {"schema": {"type": "string"}} for media in _MEDIA.values()}}},
+    | {200: {"content": {media: {"schema": {"type": _KIND[name]}} for name, media in _MEDIA.items()}}},
 )
 def export(
     request: Request,

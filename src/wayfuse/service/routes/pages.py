@@ -10,6 +10,8 @@ from fastapi.responses import FileResponse, JSONResponse, Response
 
 from wayfuse.service.access import SCHEME, allowed, server_of
 from wayfuse.service.problems import Problem, responses
+from wayfuse.service.routes.answers import answer
+from wayfuse.service.routes.answers_admin import Health
 from wayfuse.storage.tokens import Token
 
 __all__ = ["router"]
@@ -41,7 +43,13 @@ def file(name: str) -> FileResponse:
     return FileResponse(path, media_type=_TYPES[path.suffix])
 
 
-@router.get("/health", summary="Whether the server works", tags=["operation"], responses={503: {}})
+@router.get(
+    "/health",
+    summary="Whether the server works",
+    tags=["operation"],
+    responses=answer(Health) | answer(Health, 503),
+    response_model=None,
+)
 def health(request: Request) -> Response:
     """For load balancers; says nothing of what it serves."""
     pipeline = server_of(request).pipeline

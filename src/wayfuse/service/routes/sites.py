@@ -10,6 +10,8 @@ from fastapi.concurrency import run_in_threadpool
 from wayfuse.service.access import SCHEME, Admin, check_all_sites, server_of
 from wayfuse.service.limits import read_body
 from wayfuse.service.problems import responses
+from wayfuse.service.routes.answers import answer
+from wayfuse.service.routes.answers_admin import ImportedSite, Removed
 from wayfuse.service.site_changes import add_site, remove_site
 from wayfuse.service.uploaded_sites import read_upload
 
@@ -31,7 +33,14 @@ _BODY = {
 }
 
 
-@router.post("", status_code=201, summary="Import a site", openapi_extra=_BODY)
+@router.post(
+    "",
+    status_code=201,
+    summary="Import a site",
+    openapi_extra=_BODY,
+    responses=answer(ImportedSite, 201),
+    response_model=None,
+)
 async def upload(
     request: Request,
     admin: Admin,
@@ -53,7 +62,7 @@ async def upload(
     return said
 
 
-@router.delete("", summary="Take away an imported site")
+@router.delete("", summary="Take away an imported site", responses=answer(Removed), response_model=None)
 def remove(request: Request, admin: Admin, site: Annotated[str, Query(max_length=200)]) -> dict[str, Any]:
     """Its tracks, radio maps and survey stay where they are, and are there again if it is imported again."""
     check_all_sites(admin)

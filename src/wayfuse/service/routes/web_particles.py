@@ -10,6 +10,8 @@ from fastapi import APIRouter, Depends, Request
 from wayfuse.filters.particle_filter import FilterState
 from wayfuse.service.access import SCHEME, allowed, server_of
 from wayfuse.service.problems import Problem, responses
+from wayfuse.service.routes.answers import answer
+from wayfuse.service.routes.answers_plan import Particles
 from wayfuse.storage.tokens import Token
 
 __all__ = ["router"]
@@ -19,7 +21,12 @@ router = APIRouter(
 )
 
 
-@router.get("/tracks/{track}/particles", summary="Particles of a live track", responses=responses(404))
+@router.get(
+    "/tracks/{track}/particles",
+    summary="Particles of a live track",
+    responses=responses(404) | answer(Particles),
+    response_model=None,
+)
 def particles(
     request: Request, token: Annotated[Token, Depends(allowed("read"))], track: str
 ) -> dict[str, Any]:

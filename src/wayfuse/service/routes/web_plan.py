@@ -8,6 +8,8 @@ from fastapi import APIRouter, Depends, Request
 
 from wayfuse.service.access import SCHEME, Reader, SiteName, server_of, site_of
 from wayfuse.service.problems import Problem, responses
+from wayfuse.service.routes.answers import answer
+from wayfuse.service.routes.answers_plan import Floors, PlanOfFloor
 from wayfuse.service.web.plan import floor_features, floor_frame
 
 __all__ = ["router"]
@@ -20,7 +22,7 @@ router = APIRouter(
 )
 
 
-@router.get("", summary="Floors of a site")
+@router.get("", summary="Floors of a site", responses=answer(Floors), response_model=None)
 def floors(request: Request, token: Reader, site: SiteName = "") -> dict[str, Any]:
     """Bottom up; ``origin`` and ``matrix`` take metres of a floor's frame to longitude and latitude."""
     server = server_of(request)
@@ -29,7 +31,9 @@ def floors(request: Request, token: Reader, site: SiteName = "") -> dict[str, An
     return {"site": name, "floors": [floor_frame(found, i) for i in range(len(found.floors))]}
 
 
-@router.get("/{floor}", summary="Plan of a floor", responses=responses(404))
+@router.get(
+    "/{floor}", summary="Plan of a floor", responses=responses(404) | answer(PlanOfFloor), response_model=None
+)
 def plan(request: Request, token: Reader, floor: int, site: SiteName = "") -> dict[str, Any]:
     """GeoJSON: outline, units, walls, doors, connectors and their landings."""
     server = server_of(request)

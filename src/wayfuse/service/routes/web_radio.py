@@ -13,6 +13,8 @@ from wayfuse.sensors.records import bssid_text
 from wayfuse.service.access import SCHEME, SiteName, Surveyor, server_of, site_of
 from wayfuse.service.adapters.parts import identifier
 from wayfuse.service.problems import Problem, responses
+from wayfuse.service.routes.answers import answer
+from wayfuse.service.routes.answers_survey import AccessPoints, Coverage, Heat
 from wayfuse.service.web.surveys import surveys_of
 
 __all__ = ["router"]
@@ -28,7 +30,9 @@ FloorIndex = Annotated[int, Query(ge=0, le=1000, description="Index of the floor
 Version = Annotated[int | None, Query(ge=1, le=2**31 - 1, description="Of the radio map; the one in use.")]
 
 
-@router.get("/coverage", summary="How far the next fingerprint is")
+@router.get(
+    "/coverage", summary="How far the next fingerprint is", responses=answer(Coverage), response_model=None
+)
 def covered(
     request: Request, token: Surveyor, floor: FloorIndex, site: SiteName = "", version: Version = None
 ) -> dict[str, Any]:
@@ -53,7 +57,12 @@ def covered(
     }
 
 
-@router.get("/access-points", summary="Access points of the radio map")
+@router.get(
+    "/access-points",
+    summary="Access points of the radio map",
+    responses=answer(AccessPoints),
+    response_model=None,
+)
 def access_points(
     request: Request,
     token: Surveyor,
@@ -85,7 +94,9 @@ def access_points(
     return {"site": name, "version": known, "levels": list(survey.floors), "n": n_aps, "access_points": found}
 
 
-@router.get("/heat", summary="How strong an access point is over a floor")
+@router.get(
+    "/heat", summary="How strong an access point is over a floor", responses=answer(Heat), response_model=None
+)
 def heat(
     request: Request,
     token: Surveyor,

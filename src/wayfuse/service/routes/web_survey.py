@@ -19,6 +19,9 @@ from wayfuse.service.ingest import completed, ingest
 from wayfuse.service.limits import read_body
 from wayfuse.service.message import Message, Profile, SayToUserError
 from wayfuse.service.problems import Problem, responses
+from wayfuse.service.routes.answers import answer
+from wayfuse.service.routes.answers_admin import Removed
+from wayfuse.service.routes.answers_survey import JobSummary, KeptRecording, KeptWalk, SurveySummary
 from wayfuse.service.server import Server
 from wayfuse.service.web.survey_build import build
 from wayfuse.service.web.survey_store import Push, TappedWalk, Waypoint
@@ -74,7 +77,7 @@ class NewWalk(BaseModel):
     taps: Annotated[list[Tap], Field(min_length=2, max_length=10_000)]
 
 
-@router.get("", summary="What the survey has")
+@router.get("", summary="What the survey has", responses=answer(SurveySummary), response_model=None)
 def survey(request: Request, token: Surveyor, site: SiteName = "") -> dict[str, Any]:
     """Phones that push scans, walks, recordings, and the last job."""
     server, surveys = server_of(request), surveys_of(request)
@@ -96,6 +99,8 @@ def survey(request: Request, token: Surveyor, site: SiteName = "") -> dict[str, 
     "/walks",
     status_code=201,
     summary="Keep a walk tapped on the map",
+    responses=answer(KeptWalk, 201),
+    response_model=None,
 )
 def add_walk(request: Request, token: Surveyor, walk: NewWalk, site: SiteName = "") -> dict[str, Any]:
     """A place where somebody stood is two taps at one place; between two taps the way is straight and even."""
@@ -121,6 +126,8 @@ def add_walk(request: Request, token: Surveyor, walk: NewWalk, site: SiteName = 
     "/recordings",
     status_code=201,
     summary="Upload a survey recording",
+    responses=answer(KeptRecording, 201),
+    response_model=None,
     openapi_extra={
         "requestBody": {
             "required": True,
@@ -163,6 +170,8 @@ def _keep_recording(
 @router.delete(
     "/parts/{identifier}",
     summary="Delete a walk or a recording",
+    responses=answer(Removed),
+    response_model=None,
 )
 def remove(request: Request, token: Surveyor, identifier: str, site: SiteName = "") -> dict[str, Any]:
     """Radio maps built with it stay as they are."""
@@ -178,6 +187,8 @@ def remove(request: Request, token: Surveyor, identifier: str, site: SiteName = 
     "/jobs",
     status_code=202,
     summary="Build a radio map of what the survey has",
+    responses=answer(JobSummary, 202),
+    response_model=None,
 )
 def start_job(request: Request, token: Surveyor, site: SiteName = "") -> dict[str, Any]:
     """The job's result names the new version, which is not yet published, and its held-out errors room by room."""
@@ -199,6 +210,8 @@ def start_job(request: Request, token: Surveyor, site: SiteName = "") -> dict[st
 @router.get(
     "/jobs/{job}",
     summary="How far a job is",
+    responses=answer(JobSummary),
+    response_model=None,
 )
 def job(request: Request, token: Surveyor, job: int) -> dict[str, Any]:
     """``state`` is running, done or failed; ``share`` runs from 0 to 1."""

@@ -9,6 +9,7 @@ from fastapi import APIRouter, Depends, Request
 from wayfuse.service.access import SCHEME, Reader, SiteName, server_of, site_of
 from wayfuse.service.problems import responses
 from wayfuse.service.routes.answers import Inside, answer
+from wayfuse.service.routes.answers_plan import ZoneShapes
 from wayfuse.service.web.plan import zone_features
 
 __all__ = ["router"]
@@ -21,7 +22,7 @@ router = APIRouter(
 )
 
 
-@router.get("", summary="Rooms and geofences")
+@router.get("", summary="Rooms and geofences", responses=answer(ZoneShapes), response_model=None)
 def zones(request: Request, token: Reader, site: SiteName = "") -> dict[str, Any]:
     """GeoJSON: ``id``, ``name``, ``kind`` (room or geofence), ``floor`` and ``level`` of each."""
     server = server_of(request)
