@@ -54,6 +54,7 @@ _FIRST_CONFIG = replace(
     injection=0.0,
     injection_least=0.005,
     device_offset=False,
+    novelty=None,
     use_vertical=False,
 )
 # name -> whether it draws random numbers

@@ -33,6 +33,7 @@ from wayfuse.models.observation.neighbouring import NeighbouringFloors
 from wayfuse.presets.given import check_floors
 from wayfuse.radio.ap_places import ApPlaces
 from wayfuse.radio.device_offset import DeviceOffset
+from wayfuse.radio.novelty import Novelty
 from wayfuse.radio.range_line import LineGrid
 from wayfuse.radio.sparse_knn import SparseKnn
 from wayfuse.radio.survey import Survey
@@ -106,6 +107,7 @@ class Config:
     map_constraint: Literal["walkable", "barriers", "none"] = "walkable"
     use_steps: bool = True
     device_offset: bool = True  # estimate how the phone's levels differ from the survey's
+    novelty: Novelty | None = field(default_factory=Novelty)  # scans away from the survey count less
     use_vertical: bool = True  # stairs, lifts and escalators change floors
     use_pressure: bool = True
     summary: Summary = field(default_factory=lambda: CALIBRATED)
@@ -149,6 +151,7 @@ def build(
         observation=observation,
         first=first,
         device=DeviceOffset() if c.device_offset else None,
+        novelty=c.novelty,
         quiet_gain=c.quiet_exponent / c.exponent,
         moving_gain=c.moving_gain,
     )

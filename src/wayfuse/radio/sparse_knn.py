@@ -16,7 +16,8 @@ more choices. Euclidean distance over thousands of access points does markedly w
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+import math
+from dataclasses import dataclass, field, fields
 from typing import NamedTuple
 
 import numpy as np
@@ -37,7 +38,8 @@ class Neighbours(NamedTuple):
     """The k nearest fingerprints: x, y (k,) m, floor (k,), weight (k,) summing to 1.
 
     ``distance`` is that of the nearest in signal space, 0 (the same) to 1 (nothing in common); ``n_aps`` counts the
-    query's access points that the survey knows.
+    query's access points that the survey knows. ``usual`` is the distance that the neighbours have from fingerprints of
+    other walks than their own (`radio.novelty`); NaN where the survey does not say.
     """
 
     x: Array32
@@ -46,6 +48,7 @@ class Neighbours(NamedTuple):
     weight: Array32
     distance: float
     n_aps: int
+    usual: float = math.nan
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -76,6 +79,7 @@ class SparseKnn:
     _values: Array32 = field(init=False, repr=False)
     _weight: Array32 = field(init=False, repr=False)
     _row_sum: Array32 = field(init=False, repr=False)
+    _knows_usual: bool = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         if self.k < 1 or self.temperature <= 0.0:
@@ -99,8 +103,16 @@ class SparseKnn:
             "_values": values[order],
             "_weight": weight,
             "_row_sum": row_sum,
+            "_knows_usual": len(s.usual) > 0 and self._is_plain,
         }.items():
             object.__setattr__(self, name, value)
+
+    @property
+    def _is_plain(self) -> bool:
+        """Whether distances are those that `Survey.usual` was measured in."""
+        names = "rssi_floor", "exponent", "idf", "common", "bands", "share_twins"
+        mine = {f.name: f.default for f in fields(self) if f.name in names}
+        return all(getattr(self, name) == default for name, default in mine.items())
 
     @property
     def floors(self) -> tuple[str, ...]:
@@ -144,7 +156,16 @@ class SparseKnn:
             (weight / weight.sum()).astype(np.float32),
             float(best[0]),
             n_aps,
+            self._usual_of(index, weight),
         )
+
+    def _usual_of(self, index: NDArray[np.int32], weight: Array32) -> float:
+        if not self._knows_usual:
+            return math.nan
+        usual = self.survey.usual[index]
+        known = ~np.isnan(usual)
+        total = float(weight @ known)
+        return float(weight[known] @ usual[known]) / total if total > 0.0 else math.nan
 
     def mean_distances(self, column: NDArray[np.int64], rssi: Array32, k: int) -> Array32:
         """Mean distance of the k nearest for versions of a query, (S,): rssi (A, S) dBm of the survey's columns (A,).

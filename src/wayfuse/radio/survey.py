@@ -7,7 +7,7 @@ access points of which a place hears a hundred, so readings are stored row by ro
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
@@ -44,7 +44,8 @@ class Survey:
     xy : (n, 2) m, building frame. floor : (n,) index into ``floors``. walk : (n,) index into ``walks``.
     indptr : (n + 1,), indices : (k,) column of each reading, rssi : (k,) dBm: the readings, row by row.
     accuracy : m, how well its own fingerprints are found by those of other walks (`radio.survey_accuracy`), NaN where
-    nobody looked.
+    nobody looked. usual : (n,) signal distance of each fingerprint from the nearest of other walks, NaN where nobody
+    looked (`radio.novelty`); empty = of none.
     """
 
     bssid: IdArray
@@ -58,6 +59,7 @@ class Survey:
     floors: tuple[str, ...]
     walks: tuple[str, ...]
     accuracy: float = math.nan
+    usual: Array32 = field(default_factory=lambda: np.empty(0, np.float32))
 
     def __post_init__(self) -> None:
         n, m = len(self.xy), len(self.bssid)
@@ -66,6 +68,7 @@ class Survey:
             or len(self.floor) != n
             or len(self.walk) != n
             or len(self.frequency) != m
+            or len(self.usual) not in {0, n}
         ):
             raise RadioMapError(
                 f"survey arrays disagree: {n} places, {len(self.indptr) - 1} rows, {m} access points"
@@ -146,4 +149,5 @@ class Survey:
             floors=self.floors,
             walks=self.walks,
             accuracy=self.accuracy,
+            usual=self.usual[index] if len(self.usual) else self.usual,
         )

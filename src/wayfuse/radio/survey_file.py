@@ -41,6 +41,7 @@ _SURVEY_ARRAYS = {
     "indices": np.int32,
     "rssi": np.float32,
 }
+_USUAL = "usual"  # may be absent
 
 
 def survey_parts(survey: Survey) -> tuple[dict[str, Any], dict[str, NDArray[Any]]]:
@@ -49,6 +50,8 @@ def survey_parts(survey: Survey) -> tuple[dict[str, Any], dict[str, NDArray[Any]
     header: dict[str, Any] = {"floors": list(survey.floors), "walks": list(survey.walks)}
     if math.isfinite(survey.accuracy):
         header["accuracy"] = survey.accuracy
+    if len(survey.usual):
+        arrays[_USUAL] = np.asarray(survey.usual, np.float32)
     return header, arrays
 
 
@@ -63,11 +66,15 @@ def survey_from_parts(
             f"no whole survey (missing {', '.join(absent) or 'names'})", where=where, remedy=AGAIN
         )
     parts = {name: arrays[name] for name in _SURVEY_ARRAYS}
+    usual = arrays.get(_USUAL, np.empty(0, np.float32))  # files of before have none
     _check_survey(parts, len(header["floors"]), len(header["walks"]), where)
     accuracy = header.get("accuracy", math.nan)
     if not isinstance(accuracy, float):
         raise RadioMapError(f"accuracy {accuracy!r} is no number", where=where, remedy=AGAIN)
-    return Survey(**parts, floors=tuple(header["floors"]), walks=tuple(header["walks"]), accuracy=accuracy)
+    if usual.dtype != np.float32 or usual.shape not in {(0,), (len(parts["xy"]),)}:
+        raise RadioMapError("the survey's arrays do not fit together", where=where, remedy=AGAIN)
+    names = tuple(header["floors"]), tuple(header["walks"])
+    return Survey(**parts, floors=names[0], walks=names[1], accuracy=accuracy, usual=usual)
 
 
 def _check_survey(

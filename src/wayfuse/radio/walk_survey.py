@@ -19,6 +19,7 @@ from wayfuse.core.errors import RadioMapError
 from wayfuse.core.types import Array
 from wayfuse.radio.archive import read_archive, write_archive
 from wayfuse.radio.device_survey import device_shifts, normalised
+from wayfuse.radio.novelty import usual_distances
 from wayfuse.radio.scans import Readings, readings
 from wayfuse.radio.survey import Survey
 from wayfuse.radio.survey_accuracy import survey_accuracy
@@ -116,7 +117,7 @@ def survey_from_walks(
     )
     if p.normalise_devices:
         survey = normalised(survey, devices, device_shifts(survey, devices)[1])
-    return replace(survey, accuracy=survey_accuracy(survey))
+    return replace(survey, accuracy=survey_accuracy(survey), usual=usual_distances(survey))
 
 
 def _fingerprint(

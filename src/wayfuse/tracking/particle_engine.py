@@ -108,6 +108,7 @@ class ParticleState(NamedTuple):
     standing: Standing | None = None
     ranged: RangingState | None = None
     moved: float = -np.inf  # s, of the last step or the last ranges
+    novelty: float = np.nan
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -279,10 +280,12 @@ class ParticleEngine:
         known: Known,
         spacing: float,
     ) -> ParticleState:
-        log_likelihood = np.zeros(self.n_particles)
-        radio.observation.log_likelihood(now.cloud, near, log_likelihood)
-        agreement = radio.observation.agreement(now.weights, log_likelihood, near)
         is_moving = state.movement.event is not None  # nobody is drawn afresh onto stairs or into a lift
+        walks = state.n_walked >= _UNCORROBORATED and not is_moving
+        novelty, trust, observation = radio.observed(state.novelty, near, walks=walks)
+        log_likelihood = np.zeros(self.n_particles)
+        observation.log_likelihood(now.cloud, near, log_likelihood)
+        agreement = observation.agreement(now.weights, log_likelihood, near)
         log_likelihood *= radio.gain(spacing, is_quiet=state.is_quiet, is_moving=is_moving)
         inject = self.recovery.injects and not is_moving
         after, info = self.filter.update(state.key, now, log_likelihood, always_resample=inject)
@@ -290,12 +293,12 @@ class ParticleEngine:
         contradictions = state.contradictions + 1 if contradicts else 0
         if not is_moving:
             keeps = self.floor_change is not None and known.height and state.n_walked >= _UNCORROBORATED
-            share, keeps_floor = self._renewal(contradictions, agreement)
+            share, keeps_floor = self._renewal(contradictions, agreement, trust)
             after = self._renewed(
                 state.key, after, radio, near, share, known, keeps_floor=keeps and keeps_floor
             )
         ess = info.ess / self.n_particles
-        return state._replace(filter=after, contradictions=contradictions, ess=ess)
+        return state._replace(filter=after, contradictions=contradictions, ess=ess, novelty=novelty)
 
     def estimate(self, state: ParticleState, t: float) -> tuple[ParticleState, Estimate]:
         """Geometric median on the heaviest floor, with radii."""
@@ -332,7 +335,7 @@ class ParticleEngine:
         blocked = why._replace(share_blocked=why.share_blocked + n_blocked / self.n_particles)
         return state._replace(filter=after, why=blocked, n_moves=state.n_moves + 1)
 
-    def _renewal(self, contradictions: int, agreement: float) -> tuple[float, bool]:
+    def _renewal(self, contradictions: int, agreement: float, trust: float) -> tuple[float, bool]:
         """Share of particles to draw afresh, and whether they keep to the floor of those they replace."""
         rounds, rest = divmod(contradictions, self.recovery.patience)
         is_reset = rounds > 0 and rest == 0
@@ -340,7 +343,7 @@ class ParticleEngine:
         keeps_floor = not (is_reset and rounds > 1)
         if is_reset:
             return self.recovery.reset_share, keeps_floor
-        return self.recovery.injection_share(agreement), keeps_floor
+        return trust * self.recovery.injection_share(agreement), keeps_floor
 
     def _renewed(
         self,

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from wayfuse.models.initial import FirstCloud
 from wayfuse.models.observation.fingerprint import FingerprintLikelihood
 from wayfuse.radio.device_offset import DeviceOffset, OffsetState, shifted
+from wayfuse.radio.novelty import Novelty
 from wayfuse.radio.sparse_knn import Neighbours, SparseKnn
 from wayfuse.radio.survey import Fingerprint
 
@@ -21,6 +22,7 @@ class Radio:
     ----------
     radio_map : finds the fingerprints like a scan. observation : how likely that is at a particle. first : draws
     particles from a scan. device : estimates how the phone's levels differ from the survey's, None = not at all.
+    novelty : how much scans away from the survey count, None = as all others.
     quiet_gain : multiplies the log-likelihood of a scan while no motion sensor speaks, for without steps the cloud
     forgets fast and the scan before says little. moving_gain : the same while a movement between floors is under way,
     for the place of somebody on stairs is known to metres only. usual_spacing : s between scans for which the
@@ -32,6 +34,7 @@ class Radio:
     observation: FingerprintLikelihood
     first: FirstCloud
     device: DeviceOffset | None = None
+    novelty: Novelty | None = None
     quiet_gain: float = 1.0
     moving_gain: float = 1.0
     usual_spacing: float = 2.0
@@ -45,6 +48,23 @@ class Radio:
             offset = self.device.step(offset, self.radio_map, fingerprint)
             fingerprint = shifted(fingerprint, self.device.shift(offset))
         return offset, self.radio_map.neighbours(fingerprint)
+
+    def observed(
+        self, novelty: float, near: Neighbours, *, walks: bool
+    ) -> tuple[float, float, FingerprintLikelihood]:
+        """Novelty after a scan, what the scan counts (0 to 1), and the observation tempered by it.
+
+        The bonus of particles away from the survey is not tempered: it is for such scans that it is there. Nor is
+        anything where steps say nothing instead (``walks`` is false): before the first of them, when only scans tell
+        the floor, and on stairs and in lifts, which are hardly ever surveyed.
+        """
+        if self.novelty is None:
+            return novelty, 1.0, self.observation
+        novelty = self.novelty.step(novelty, near)
+        trust = self.novelty.trust(novelty) if walks else 1.0
+        if trust == 1.0:
+            return novelty, trust, self.observation
+        return novelty, trust, replace(self.observation, exponent=trust * self.observation.exponent)
 
     def gain(self, spacing: float, *, is_quiet: bool, is_moving: bool) -> float:
         """Factor of a scan's log-likelihood, ``spacing`` seconds after the scan before."""
