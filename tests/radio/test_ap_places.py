@@ -105,6 +105,7 @@ def test_a_file_made_by_hand(tmp_path: Path) -> None:
             ":3: bssid .* is in line 2 already",
         ),
         ("bssid,x,y,floor,height,sigma\n0a:00:00:00:00:01,1,2,F1,,-1\n", ":2: sigma -1.0 is negative"),
+        pytest.param(HEADER + "x" * 140_000 + ",1,2,F1,\n", ":2: field larger than", id="a field too long"),
     ],
 )
 def test_damaged_lines_are_named(tmp_path: Path, text: str, said: str) -> None:
@@ -112,6 +113,12 @@ def test_damaged_lines_are_named(tmp_path: Path, text: str, said: str) -> None:
     path.write_text(text)
     with pytest.raises(FormatError, match=said):
         read_ap_places(path, FLOORS)
+
+
+def test_what_only_looks_like_a_digest_is_a_name(tmp_path: Path) -> None:
+    (tmp_path / "aps.csv").write_text(HEADER + "#-00000000000000f,1,2,F1,\n#00000000000000_1,1,2,F1,\n")
+    read = read_ap_places(tmp_path / "aps.csv", FLOORS)  # the minus used to end in an error of Python's own
+    assert read.bssid.tolist() == [bssid_id("#-00000000000000f"), bssid_id("#00000000000000_1")]
 
 
 def test_absent_and_binary_files_are_told(tmp_path: Path) -> None:

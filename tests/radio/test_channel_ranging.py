@@ -137,6 +137,14 @@ def test_what_cannot_be_fitted_or_read_is_named(tmp_path: Path) -> None:
     with pytest.raises(RadioMapError, match="not a channel model"):
         load_channel_model(tmp_path / "odd.npz")
     assert read_archive(tmp_path / "odd.npz")[0] == "channel-model"
+    of_floats = {
+        "anchor": np.array([np.nan]),
+        "regressions": np.ones((1, 1, 2)),
+        "subcarriers": np.arange(30),
+    }
+    write_archive(tmp_path / "odd.npz", "channel-model", 1, {"site": "x"}, of_floats)
+    with pytest.raises(RadioMapError, match="not a channel model"):
+        load_channel_model(tmp_path / "odd.npz")
 
 
 def test_cards_are_known_by_their_subcarriers() -> None:

@@ -11,10 +11,11 @@ from __future__ import annotations
 
 import csv
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
+from string import hexdigits
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -112,28 +113,39 @@ def read_ap_places(path: str | PathLike[str], floor_names: Sequence[str]) -> ApP
         raise DataMissingError(f"cannot be read: {error.strerror}", where=path, remedy=_REMEDY) from error
     except UnicodeDecodeError as error:
         raise FormatError("is not text in UTF-8", where=path, remedy=_REMEDY) from error
-    lines = csv.reader(text.splitlines())
-    header = [name.strip().lower() for name in next(lines, [])]
+    lines = _lines(path, text)
+    _, first_line = next(lines, (1, []))
+    header = [name.strip().lower() for name in first_line]
     if not set(_HEADER[:4]) <= set(header):
         raise FormatError("the header lacks a column", where=f"{path}:1", remedy=_REMEDY)
     floors = {name: index for index, name in enumerate(floor_names)}
     seen: dict[int, int] = {}
     rows: list[_Row] = []
-    for fields in lines:
-        where = f"{path}:{lines.line_num}"
+    for number, fields in lines:
+        where = f"{path}:{number}"
         if not any(field.strip() for field in fields):
             continue
         if len(fields) != len(header):
             what = f"{len(fields)} fields, the header has {len(header)}"
             raise FormatError(what, where=where, remedy=_REMEDY)
         row = _row(dict(zip(header, (field.strip() for field in fields), strict=True)), floors, where)
-        first = seen.setdefault(row[0], lines.line_num)
-        if first != lines.line_num:
+        first = seen.setdefault(row[0], number)
+        if first != number:
             raise FormatError(
                 f"bssid {bssid_text(row[0])} is in line {first} already", where=where, remedy="keep one"
             )
         rows.append(row)
     return _places(rows, is_estimated=_SIGMA in header, has_power=_POWER in header)
+
+
+def _lines(path: Path, text: str) -> Iterator[tuple[int, list[str]]]:
+    """Numbers of lines and their fields."""
+    lines = csv.reader(text.splitlines())
+    try:
+        for fields in lines:
+            yield lines.line_num, fields
+    except csv.Error as error:
+        raise FormatError(f"{error}", where=f"{path}:{lines.line_num}", remedy=_REMEDY) from error
 
 
 def _row(fields: Mapping[str, str], floors: Mapping[str, int], where: str) -> _Row:
@@ -156,12 +168,8 @@ def _row(fields: Mapping[str, str], floors: Mapping[str, int], where: str) -> _R
 def _identifier(text: str) -> int:
     """The inverse of `bssid_text`: digests are written as # and hexadecimal digits."""
     digits = text.removeprefix("#")
-    if len(digits) == len(text) - 1 == _DIGEST_DIGITS:
-        try:
-            return _HASHED | int(digits, 16)
-        except ValueError:
-            pass
-    return bssid_id(text)
+    is_digest = len(digits) == len(text) - 1 == _DIGEST_DIGITS and set(digits) <= set(hexdigits)
+    return _HASHED | int(digits, 16) if is_digest else bssid_id(text)
 
 
 def _number(fields: Mapping[str, str], name: str, where: str) -> float:

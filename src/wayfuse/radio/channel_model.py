@@ -69,6 +69,8 @@ def load_channel_model(path: str | PathLike[str], of: str = "") -> ChannelModel:
         ids, table, subcarriers = arrays["anchor"], arrays["regressions"], arrays["subcarriers"]
         if ids.ndim != 1 or table.shape[:1] != ids.shape or table.shape[2:] != (2,) or subcarriers.ndim != 1:
             raise ValueError
+        if ids.dtype != np.uint64 or table.dtype.kind != "f" or subcarriers.dtype.kind != "i":
+            raise ValueError
         site = str(header["site"])
     except (KeyError, ValueError) as fault:
         raise RadioMapError(
