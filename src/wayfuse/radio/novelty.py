@@ -20,7 +20,7 @@ import numpy as np
 from wayfuse.core.errors import ConfigError
 from wayfuse.core.types import Array32
 from wayfuse.radio.sparse_knn import Neighbours, SparseKnn
-from wayfuse.radio.survey import Fingerprint, Survey
+from wayfuse.radio.survey import Survey
 
 __all__ = ["Novelty", "usual_distances"]
 
@@ -37,10 +37,7 @@ def usual_distances(survey: Survey, most: int = _MOST) -> Array32:
     radio_map = SparseKnn(survey, k=1)
     usual = np.full(len(survey), np.nan, np.float32)
     for row in np.unique(np.linspace(0, len(survey) - 1, most).astype(np.int64)).tolist():
-        part = slice(int(survey.indptr[row]), int(survey.indptr[row + 1]))
-        columns = survey.indices[part]
-        query = Fingerprint(survey.bssid[columns], survey.rssi[part], survey.frequency[columns])
-        near = radio_map.neighbours(query, without_walk=int(survey.walk[row]))
+        near = radio_map.neighbours(survey.fingerprint(row), without_walk=int(survey.walk[row]))
         if near is not None and near.distance < 1.0:
             usual[row] = near.distance
     return usual

@@ -131,6 +131,12 @@ class Survey:
         out[column[column >= 0]] = fingerprint.rssi[column >= 0]
         return out
 
+    def fingerprint(self, row: int) -> Fingerprint:
+        """What was heard at a place."""
+        part = slice(int(self.indptr[row]), int(self.indptr[row + 1]))
+        column = self.indices[part]
+        return Fingerprint(self.bssid[column], self.rssi[part], self.frequency[column])
+
     def select(self, rows: NDArray[np.integer] | NDArray[np.bool_]) -> Survey:
         """The survey of some rows; access points and names stay."""
         index = np.flatnonzero(rows) if rows.dtype == np.bool_ else np.asarray(rows)

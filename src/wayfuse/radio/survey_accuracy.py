@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from wayfuse.core.types import Array
 from wayfuse.radio.sparse_knn import SparseKnn, fix_of
-from wayfuse.radio.survey import Fingerprint, Survey
+from wayfuse.radio.survey import Survey
 
 __all__ = ["HeldOut", "held_out", "held_out_errors", "survey_accuracy"]
 
@@ -54,10 +54,7 @@ def held_out(survey: Survey, n: int = 300) -> HeldOut:
     rows: list[int] = []
     errors: list[float] = []
     for row in np.unique(np.linspace(0, len(survey) - 1, n).astype(np.int64)).tolist():
-        part = slice(int(survey.indptr[row]), int(survey.indptr[row + 1]))
-        columns = survey.indices[part]
-        query = Fingerprint(survey.bssid[columns], survey.rssi[part], survey.frequency[columns])
-        near = radio_map.neighbours(query, without_walk=int(survey.walk[row]))
+        near = radio_map.neighbours(survey.fingerprint(row), without_walk=int(survey.walk[row]))
         if (
             near is None or near.distance >= 1.0
         ):  # the nearest of the other walks has nothing in common with it
