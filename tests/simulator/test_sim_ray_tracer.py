@@ -103,7 +103,7 @@ def test_metal_shuts_out_what_a_board_lets_through():
     assert heard[1] == 0.0
 
 
-def test_a_scenario_with_rays_gives_levels_and_channel_state_twice_the_same(tmp_path):
+def test_a_scenario_with_rays_gives_levels_and_channel_state(tmp_path):
     skip_without_tracer()
     path = tmp_path / "scenario.toml"
     path.write_text(
@@ -118,17 +118,11 @@ def test_a_scenario_with_rays_gives_levels_and_channel_state_twice_the_same(tmp_
             told.append(n)
             yield one
 
-    walks = []
-    for _ in range(2):
-        _, world = make_world(load_scenario_file(path), 5, tmp_path, progress)
-        walks.append(simulate_plan(world, plan_walks(world)[-1]).recording)
-    assert len(told) == 2 * told[0] > 0
-    first, second = walks
-    assert first.wifi
-    assert len(first.csi) > 20
-    for a, b in zip(first.csi, second.csi, strict=True):
-        assert np.array_equal(a.csi, b.csi)
-    heard = {int(network) for scan in first.wifi for network in scan.bssid}
+    _, world = make_world(load_scenario_file(path), 5, tmp_path, progress)
+    walk = simulate_plan(world, plan_walks(world)[-1]).recording
+    assert len(told) == told[0] > 0
+    assert len(walk.csi) > 20
+    heard = {int(network) for scan in walk.wifi for network in scan.bssid}
     assert len(heard) >= 8  # three networks on each of four radios, less a few
 
 

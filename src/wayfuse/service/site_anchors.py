@@ -6,7 +6,6 @@ channel`, makes ranges of the channel state they send. Both may be absent.
 
 from __future__ import annotations
 
-import csv
 import re
 import tempfile
 from pathlib import Path
@@ -83,7 +82,7 @@ def uploaded_anchors(files: AnchorFiles, site: Site) -> SiteAnchors | None:
             line = re.search(r":(\d+)$", error.where)
             said = f"line {line[1]}: {error.what}" if line else error.what
             raise UsageError(said[:_MOST_TOLD], remedy=error.remedy[:_MOST_TOLD]) from error
-        except (csv.Error, OverflowError, ValueError) as error:
+        except (OverflowError, ValueError) as error:
             raise UsageError(f"cannot be read: {error}"[:_MOST_TOLD], remedy="make it again") from error
     if found is not None and not len(found.places):
         raise UsageError("there is no anchor in it", remedy="give a line for each: bssid,x,y,floor,height")
