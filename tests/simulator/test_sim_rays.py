@@ -17,7 +17,7 @@ from wayfuse.simulator.channel_state import ChannelModel
 from wayfuse.simulator.extrusion import slab_surfaces, wall_surfaces
 from wayfuse.simulator.hall import hall
 from wayfuse.simulator.radio_field import RadioModel, changed
-from wayfuse.simulator.ray_tracer import Antennas, trace_rays
+from wayfuse.simulator.ray_tracer import Antennas, Work, newest_library, trace_rays
 from wayfuse.simulator.rays import ChannelRays, Raster, RayField, RaysModel
 from wayfuse.simulator.scenario import Scenario
 from wayfuse.simulator.simulate import site_in
@@ -111,6 +111,21 @@ def test_without_sionna_the_remedy_is_named(monkeypatch):
     assert "wayfuse[sionna]" in caught.value.remedy
 
 
+def test_the_newest_library_is_taken(monkeypatch, tmp_path):
+    monkeypatch.setattr(ray_tracer, "_LIBRARIES", (f"{tmp_path}/none*.so*",))
+    assert newest_library() == ""
+    for name in (
+        "libLLVM-9.so.1",
+        "libLLVM-14.0.6.so.1",
+        "libLLVM-15.so",
+        "libLLVM.so.19.1",
+        "libLLVMjunk.so",
+    ):
+        (tmp_path / name).touch()
+    monkeypatch.setattr(ray_tracer, "_LIBRARIES", (f"{tmp_path}/libLLVM*.so*",))
+    assert newest_library() == str(tmp_path / "libLLVM.so.19.1")
+
+
 def test_rays_that_were_not_traced_are_missed_and_not_made_up():
     with pytest.raises(UsageError, match="no rays"):
         _hall_site().radios.rssi(np.array([0]), np.array([[5.0, 5.0]]), 0)
@@ -120,7 +135,7 @@ def test_rays_that_were_not_traced_are_missed_and_not_made_up():
 def test_only_access_points_that_moved_are_traced_again(monkeypatch, period):
     asked = []
 
-    def told(building, model, antennas, heights, seed, progress):
+    def told(building, model, antennas, heights, seed, work):
         asked.append(antennas)
         raster = Raster.over(building.storeys[0].outline, 4.0)
         n, places = len(antennas.place), raster.rows * raster.columns
@@ -133,7 +148,7 @@ def test_only_access_points_that_moved_are_traced_again(monkeypatch, period):
     monkeypatch.setattr(traced_site, "trace_rays", told)
     before = _hall_site()
     later = replace(before, radios=changed(before.radios, before.building, 2, 1, np.random.default_rng(3)))
-    first, second = traced_site.traced(before, later, ChannelModel(period_s=period), 0, lambda done, _: done)
+    first, second = traced_site.traced(before, later, ChannelModel(period_s=period), 0, Work())
     moved = np.any(later.radios.ap_xy != before.radios.ap_xy, axis=1)[before.radios.ap]
     assert moved.any()
     assert [len(a.place) for a in asked] == [len(moved), moved.sum()]

@@ -45,13 +45,14 @@ def simulate(
     from wayfuse.cli.work import map_recordings, progress_bar
     from wayfuse.simulator.experiment import make_world, plan_walks
     from wayfuse.simulator.experiment_files import check_formats, write_tables
+    from wayfuse.simulator.ray_tracer import Work
     from wayfuse.simulator.scenario_file import find_scenario, load_scenario_file
 
     source = find_scenario(scenario)
     file = load_scenario_file(source)
     _claim(out)
     used = file.seed if seed is None else seed
-    site, world = make_world(file, used, source.parent, progress_bar("tracing rays"))
+    site, world = make_world(file, used, source.parent, Work(jobs, progress_bar("tracing rays")))
     plans = plan_walks(world)
     check_formats(world, plans)
     _write_world(out, world, source.read_text(encoding="utf-8"))

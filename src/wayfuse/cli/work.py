@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
@@ -10,6 +9,7 @@ from typing import TypeVar
 
 import click
 
+from wayfuse.core.cores import usable_cores
 from wayfuse.core.errors import UsageError
 
 __all__ = ["check_target", "map_recordings", "progress_bar", "report_faults"]
@@ -28,7 +28,7 @@ def map_recordings(
 
     ``work`` must be picklable: it is sent once to each process.
     """
-    n = min(jobs or _cores(), len(paths))
+    n = min(jobs or usable_cores(), len(paths))
     with click.progressbar(length=len(paths), label=label, file=sys.stderr) as bar:
         if n <= 1 or len(paths) <= _SERIAL:
             for path in paths:
@@ -72,10 +72,6 @@ def check_target(out: Path) -> None:
         raise UsageError("is a folder", where=out, remedy="name a file")
     if not out.parent.is_dir():
         raise UsageError(f"there is no folder {out.parent}", where=out, remedy="create it first")
-
-
-def _cores() -> int:
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def _start(work: Callable[[Path], object]) -> None:

@@ -7,10 +7,8 @@ far.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -28,6 +26,7 @@ from wayfuse.simulator.hall import hall
 from wayfuse.simulator.house_site import site_of
 from wayfuse.simulator.journeys import Journey, Trip, draw_trips, plan_journey, stay
 from wayfuse.simulator.radio_field import changed
+from wayfuse.simulator.ray_tracer import Work
 from wayfuse.simulator.round_trip import measure_ranges
 from wayfuse.simulator.routes import Manner
 from wayfuse.simulator.scenario import Scenario
@@ -93,14 +92,14 @@ def make_world(
     scenario: ScenarioFile,
     seed: int,
     folder: Path,
-    progress: Callable[[Iterable[Any], int], Iterable[Any]] = lambda done, _: done,
+    work: Work = Work(),
 ) -> tuple[Site, World]:
     """Draw the world.
 
     Parameters
     ----------
     folder : that of the scenario's file, from which a site folder counts.
-    progress : passes parts of long work on as they come; it is told how many there will be.
+    work : processes and progress where rays are traced; without influence.
 
     Raises
     ------
@@ -125,7 +124,7 @@ def make_world(
     after_rng = np.random.default_rng((seed, _CHANGES))
     later = replace(before, radios=changed(before.radios, building, change.moved, change.removed, after_rng))
     if scenario.radio.model == "rays":
-        before, later = traced(before, later, scenario.csi, seed, progress)
+        before, later = traced(before, later, scenario.csi, seed, work)
     return site, World(scenario, seed, before, later, shift, georeferenced)
 
 

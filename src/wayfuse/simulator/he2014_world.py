@@ -29,10 +29,9 @@ import numpy as np
 
 from wayfuse.core.errors import ConfigError
 from wayfuse.core.types import Array
+from wayfuse.simulator.free_space import LIGHT
 
 __all__ = ["Room", "Sensed", "Walk", "sense", "strength", "survey_places", "true_walk"]
-
-_LIGHT = 299_792_458.0  # m/s
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -97,7 +96,7 @@ class Sensed(NamedTuple):
 def strength(room: Room, xy: Array) -> Array:
     """Strength (N, a) dBm of the access points at places (N, 2) m, without noise."""
     device = np.column_stack([xy, np.full(len(xy), room.device_height)])
-    wavelength = _LIGHT / room.frequency
+    wavelength = LIGHT / room.frequency
     out = np.empty((len(xy), len(room.ap_xy)))
     for a, ap in enumerate(room.ap_xy):
         image, count = _images(np.array([*ap, room.ap_height]), np.array(room.size), room.reflections)

@@ -23,6 +23,7 @@ from wayfuse.core.types import Array, BoolArray, IdArray, IntArray
 from wayfuse.simulator.building import Building, Storey
 from wayfuse.simulator.chu2009_world import draw_pattern
 from wayfuse.simulator.fields import WaveField, exponential_field
+from wayfuse.simulator.free_space import first_metre_db
 from wayfuse.simulator.geometry import clearance, crossings, inside
 from wayfuse.simulator.he2014_world import Room as EmptyRoom
 from wayfuse.simulator.he2014_world import strength
@@ -196,7 +197,7 @@ class RadioField:
                 device_height=PHONE_HEIGHT,
                 permittivity=self.model.permittivity,
                 frequency=carrier,
-                power_dbm=20.0 * float(np.log10(4.0 * np.pi * carrier / 299_792_458.0)),
+                power_dbm=first_metre_db(carrier),
             )
             here = band == b
             if here.any():

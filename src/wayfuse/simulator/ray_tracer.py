@@ -30,15 +30,16 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from wayfuse.core.cores import usable_cores
 from wayfuse.core.errors import ConfigError
 from wayfuse.core.types import Array, BoolArray, IntArray
 from wayfuse.simulator.building import Building
 from wayfuse.simulator.extrusion import Surfaces, slab_surfaces, wall_surfaces
+from wayfuse.simulator.free_space import first_metre_db
 from wayfuse.simulator.rays import SILENT_DB, ChannelRays, Raster, RayField, RaysModel
 
-__all__ = ["Antennas", "newest_library", "trace_rays"]
+__all__ = ["Antennas", "Work", "newest_library", "trace_rays"]
 
-_LIGHT = 299_792_458.0  # m/s
 _TOGETHER = 4  # antennas traced at a time: a million rays each take about a gigabyte
 _KEPT = 32  # strongest rays of a channel
 _LLVM = "DRJIT_LIBLLVM_PATH"
@@ -46,6 +47,14 @@ _LIBRARIES = ("/usr/lib/*/libLLVM*.so*", "/usr/lib/llvm-*/lib/libLLVM*.so*", "/u
 _REMEDY = f"install a new LLVM (19 is known to work; Debian: libllvm19), or name its library in {_LLVM}"
 _ROUNDED_DB = 2  # decimals kept of a level
 _scene: _Scene | None = None  # of a process of the pool
+
+
+class Work(NamedTuple):
+    """How long work is done: in ``jobs`` processes (None: all cores), its parts passed on as they come by ``progress``,
+    which is told how many there will be."""
+
+    jobs: int | None = None
+    progress: Callable[[Iterable[Any], int], Iterable[Any]] = lambda done, _: done
 
 
 class Antennas(NamedTuple):
@@ -82,14 +91,14 @@ def trace_rays(
     antennas: Antennas,
     heights: tuple[float, float],
     seed: int,
-    progress: Callable[[Iterable[Any], int], Iterable[Any]] = lambda done, _: done,
+    work: Work = Work(),
 ) -> RayField:
     """Levels and channels of all radios on all storeys.
 
     Parameters
     ----------
     heights : m, of the phone above its floor, and of the top storey.
-    progress : is given the results as they come, and how many there will be.
+    work : processes and progress, without influence on the result.
 
     Raises
     ------
@@ -104,15 +113,14 @@ def trace_rays(
     rasters = tuple(Raster.over(storey.outline, model.raster_m) for storey in building.storeys)
     gain = tuple(np.full((n, r.rows, r.columns), SILENT_DB, dtype=np.float32) for r in rasters)
     channels = _no_channels(building, model, n) if antennas.has_channel.any() else ()
-    for task, result in progress(_traced(scene, tasks), len(tasks)):
+    for task, result in work.progress(_traced(scene, tasks, work.jobs), len(tasks)):
         if task.is_channel:
             there = channels[task.floor]
             for kept, new in zip((there.delay, there.amplitude, there.azimuth), result, strict=True):
                 kept[task.radios] = new
         else:
-            one_metre = 20.0 * np.log10(4.0 * np.pi * task.carrier / _LIGHT)
             with np.errstate(divide="ignore"):
-                level = np.maximum(10.0 * np.log10(result) + one_metre, SILENT_DB)
+                level = np.maximum(10.0 * np.log10(result) + first_metre_db(task.carrier), SILENT_DB)
             gain[task.floor][task.radios] = np.round(level, _ROUNDED_DB)
     return RayField(rasters, gain, channels)
 
@@ -141,11 +149,10 @@ def _no_channels(building: Building, model: RaysModel, n: int) -> tuple[ChannelR
     return tuple(out)
 
 
-def _traced(scene: _Scene, tasks: Sequence[_Task]) -> Iterable[tuple[_Task, Any]]:
+def _traced(scene: _Scene, tasks: Sequence[_Task], jobs: int | None) -> Iterable[tuple[_Task, Any]]:
     """Each task with its result, in order."""
-    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
     spawn = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(min(cores, len(tasks)), spawn, _begin, (scene,)) as pool:
+    with ProcessPoolExecutor(min(jobs or usable_cores(), len(tasks)), spawn, _begin, (scene,)) as pool:
         try:
             yield from zip(tasks, pool.map(_run, tasks), strict=True)
         except (BrokenProcessPool, ImportError) as error:

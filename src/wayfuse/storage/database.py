@@ -23,9 +23,8 @@ __all__ = ["open_database", "take_lease"]
 
 _MIGRATIONS = Path(__file__).parent / "migrations"
 _BUSY_MS = 10_000  # a reader waits so long for the writer before it gives up
-_MOST_LOG = (
-    16 << 20
-)  # bytes of the write-ahead log that stay when a large deletion made it longer; usually 4 MiB
+# bytes of the write-ahead log that stay when a large deletion made it longer; usually 4 MiB
+_MOST_LOG = 16 << 20
 _LEASE = 0x7761_7966  # number of the advisory lock of a server on PostgreSQL
 
 

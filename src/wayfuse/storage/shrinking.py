@@ -16,9 +16,8 @@ __all__ = ["give_back"]
 
 _INCREMENTAL = 2  # of PRAGMA auto_vacuum
 _BITE = 256  # pages of 4 KiB, some hundredths of a second
-_SPARE = (
-    8  # one page of so many stays free: a server that deletes as much as comes would move pages for nothing
-)
+# one page of so many stays free: a server that deletes as much as comes would move pages for nothing
+_SPARE = 8
 
 
 def give_back(engine: Engine) -> bool:
