@@ -7,10 +7,13 @@ import pytest
 
 from wayfuse.core.errors import ConfigError
 from wayfuse.filters.cloud import Cloud
+from wayfuse.maps.walkable import Walkable
+from wayfuse.models.initial import Anywhere
 from wayfuse.models.observation.anchored_ranges import AnchoredRanges
 from wayfuse.radio.ap_places import ApPlaces
 from wayfuse.radio.range_line import LineGrid, Spread
 from wayfuse.sensors.records import Range
+from wayfuse.tracking.engine import Known
 from wayfuse.tracking.range_parts import Ranging
 
 XY = np.array([[0.0, 0.0], [12.0, 0.0], [12.0, 8.0], [0.0, 8.0]])
@@ -82,6 +85,26 @@ def test_unknown_anchors_teach_nothing() -> None:
     both = [*moment(1.0)[:1], Range(1.0, 99, 5.0)]
     some = parts.look(state, cloud(), EVEN, both, 1.0)[1]
     np.testing.assert_array_equal(some, parts.look(state, cloud(), EVEN, both[:1], 1.0)[1])
+
+
+def test_a_track_begins_on_the_floor_of_the_anchors_though_the_ranges_fit_another() -> None:
+    two = {"offsets": np.zeros((2, 2)), "elevations": np.array([0.0, 4.0])}
+    ranges = AnchoredRanges(places=PLACES, **two, sigma=1.0, gain=0.3)
+    true = np.hypot(*(XY - [7.0, 3.0]).T)
+    upstairs = [Range(0.0, k + 1, float(np.hypot(d, 4.0))) for k, d in enumerate(true)]
+    upstairs.append(Range(0.0, 99, 5.0))  # of an anchor that nobody knows
+    anywhere = Anywhere(walkable=(Walkable((0.0, 0.0), 0.5, np.ones((16, 24), np.uint8)),) * 2)
+    shares = []
+    for slab in (1.0, 0.3, 0.01):
+        parts = Ranging(ranges=ranges, lines=LINE, slab=slab)
+        _, first = parts.begin(anywhere, (3, 0), 4 * N, upstairs[:1] + upstairs[-1:], 0.0, Known())
+        assert first is not None
+        shares.append(float(first.cloud.floor.mean()))
+    odds = [s / (1.0 - s) for s in shares]
+    assert odds[1] / odds[0] == pytest.approx(0.3, rel=0.2)
+    assert shares[2] < 0.02
+    with pytest.raises(ConfigError, match="slab"):
+        Ranging(ranges=ranges, slab=0.0)
 
 
 def test_what_cannot_be_is_refused() -> None:

@@ -102,6 +102,9 @@ class Config:
     range_gain: float = 0.3  # tempering: errors of successive ranges of an anchor are much alike
     range_spacing: float = 0.5  # s between ranges of an anchor; closer ones say less
     range_near: float = 4.0  # m; ranges beyond say less, in proportion
+    range_slab: float = (
+        0.3  # how often anchors a floor away are heard, of how often those on the same floor are
+    )
     range_creep: float = 0.5  # m per root second and axis, between moments without a step
     range_lines: LineGrid = field(default_factory=LineGrid)  # how the phone measures; estimated
     map_constraint: Literal["walkable", "barriers", "none"] = "walkable"
@@ -201,6 +204,7 @@ def _ranging(site: Site, places: ApPlaces, c: Config) -> Ranging | None:
         lines=c.range_lines,
         creep=RandomWalk(c.range_creep) if c.range_creep > 0.0 else None,
         usual_spacing=c.range_spacing,
+        slab=c.range_slab,
     )
 
 

@@ -46,7 +46,8 @@ class Ranging:
     from moment to moment while no step is made, None = none: people shift, push a cart, or walk with a phone whose
     sensors are too slow to show steps. usual_spacing : s between ranges of one anchor that ``ranges.gain`` was chosen
     for; the errors of closer ones are more alike, so each says less, in proportion and by no more than a factor of
-    ``spacing_range``.
+    ``spacing_range``. slab : how often an anchor one floor away is heard, of how often one on the same floor is; counts
+    where ranges begin a track, for ranges of some metres and more hardly differ from floor to floor.
     """
 
     ranges: AnchoredRanges
@@ -54,10 +55,13 @@ class Ranging:
     creep: RandomWalk | None = None
     usual_spacing: float = 0.5
     spacing_range: float = 10.0
+    slab: float = 0.3
 
     def __post_init__(self) -> None:
         if not (self.usual_spacing > 0.0 and self.spacing_range >= 1.0):
             raise ConfigError("usual_spacing must be positive, spacing_range at least 1", where="Ranging")
+        if not 0.0 < self.slab <= 1.0:
+            raise ConfigError("slab must be a share above 0", where="Ranging")
 
     def init(self) -> RangingState:
         """Before the first range."""
@@ -98,13 +102,21 @@ class Ranging:
         t: float,
         known: Known,
     ) -> tuple[RangingState, FilterState | None]:
-        """The first n particles: the best of many that are anywhere; None where no anchor is known."""
+        """The first n particles: the best of many that are anywhere, rather on the floors of the anchors; None where no
+        anchor is known."""
         noise, many = Noise(key), _TRIED * n
         cloud = anywhere.draw(noise, many, heading_known=known.heading)
         even = FilterState(cloud, np.zeros(many), noise.draw)
         state, log_weights = self.look(self.init(), cloud, even.weights, ranges, t)
         if log_weights is None:
             return state, None
-        weights = even._replace(log_weights=log_weights).weights
+        slabs = self._slabs(cloud, ranges)
+        weights = even._replace(log_weights=log_weights + slabs * math.log(self.slab)).weights
         chosen = cloud.take(systematic(noise, weights, n))
         return state, FilterState(chosen, np.zeros(n), noise.draw)
+
+    def _slabs(self, cloud: Cloud, ranges: Sequence[Range]) -> Array:
+        """Floor slabs (N,) between particles and the known anchors, all together."""
+        at = self.ranges.places.rows(np.array([r.anchor for r in ranges], np.uint64))
+        floors = self.ranges.places.floor[at[at >= 0]]
+        return np.asarray(np.abs(cloud.floor[:, None] - floors).sum(axis=1, dtype=np.float64))
