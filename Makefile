@@ -6,6 +6,8 @@ VENV := .venv
 STAMP := $(VENV)/.wayfuse-setup
 WEB := src/wayfuse/service/web
 PAGE := $(WEB)/assets/built.sha256.txt
+# a process for each core, at most four; the tests of a file stay together, for they share its servers
+PARALLEL := -n auto --maxprocesses 4 --dist loadfile
 
 .PHONY: setup sionna web demo test test-fast check lint types imports cov results bench clean
 
@@ -33,10 +35,10 @@ demo: setup
 	$(VENV)/bin/wayfuse demo --out demo-out
 
 test: setup lint types imports
-	$(VENV)/bin/python -m pytest
+	$(VENV)/bin/python -m pytest $(PARALLEL)
 
 test-fast: setup
-	$(VENV)/bin/python -m pytest -m "not slow"
+	$(VENV)/bin/python -m pytest $(PARALLEL) -m "not slow"
 
 check: test
 

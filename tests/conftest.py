@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import os
 import sys
 from collections.abc import Callable
@@ -37,6 +38,14 @@ def ms_indoor(data_root: Path) -> Path:
     if not site.is_dir():
         pytest.skip(f"REAL DATA ABSENT: no folder {site}; fetch with `wayfuse datasets fetch ms-indoor`")
     return site
+
+
+@pytest.fixture(scope="session")
+def read_log() -> Callable[[Path], Recording]:
+    """Reads a real log, each once for all tests; nobody writes into its arrays."""
+    from wayfuse.formats.reading import read
+
+    return functools.cache(read)
 
 
 @dataclass(frozen=True)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -30,6 +31,11 @@ def repetitions(world: Any) -> Repetitions:
     recordings = tuple(replace(r, name=name) for r, name in zip(world.walks, NAMES, strict=True))
     walks = [survey_walk(world.site, r)[0] for r in recordings]
     return Repetitions(world.site, recordings, tuple(w for w in walks if w is not None))
+
+
+def test_a_survey_is_made_once(repetitions: Repetitions) -> None:
+    assert repetitions.survey(1) is repetitions.survey(1)
+    assert len({id(repetitions.survey(*key)) for key in ((1, 0), (1, 2), (2, 0))}) == 3
 
 
 def test_names_tell_trial_and_repetition() -> None:
@@ -140,9 +146,9 @@ def test_behaviours_hold_their_bars(data_root: Path) -> None:
 
 @pytest.mark.real_data
 @pytest.mark.slow
-def test_stairs_and_lift_of_ipin2023_are_followed(data_root: Path) -> None:
+def test_stairs_and_lift_of_ipin2023_are_followed(data_root: Path, read_log: Callable[..., Any]) -> None:
     needs(data_root, ("ipin2023-track3", "logs/"))
-    repetitions = gather(data_root / "ipin2023-track3" / "logs")
+    repetitions = gather(data_root / "ipin2023-track3" / "logs", lambda _, paths, __: map(read_log, paths))
     section = measure_ipin2023(repetitions, ("fused",), ("wknn",), (0,), DRAW)
     changes = section["changes"]["fused"]
     assert (changes["true"], changes["right"], changes["extra"], changes["invented"]) == (16, 16, 0, 0)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -101,11 +102,11 @@ def test_a_rebuilt_log_does_not_invent_last_seen(logs: Path) -> None:
 
 @pytest.mark.real_data
 @pytest.mark.slow
-def test_all_real_logs_are_without_fault(logs: Path) -> None:
+def test_all_real_logs_are_without_fault(logs: Path, read_log: Callable[[Path], Recording]) -> None:
     paths = sorted(logs.glob("*.txt"))
     assert len(paths) == 39
     for path in paths:
-        r = read(path)
+        r = read_log(path)
         assert r.report.n_bad == 0
         assert 48 < len(r.acceleration) / np.ptp(r.acceleration.t) < 52 or len(r.acceleration) > 1000
 

@@ -13,7 +13,6 @@ from scipy.spatial.transform import Rotation
 
 from wayfuse.core.angles import wrap
 from wayfuse.core.errors import ConfigError, UsageError
-from wayfuse.formats.reading import read
 from wayfuse.inertial.front_end import InertialFrontEnd, StepEvents
 from wayfuse.inertial.series import (
     floor_counts,
@@ -182,7 +181,7 @@ def test_what_cannot_be_fitted_or_is_no_model_is_refused():
 # --- on real walks ----------------------------------------------------------------------------------------
 @pytest.mark.slow
 @pytest.mark.real_data
-def test_direction_and_stride_on_straight_legs(data_root: Path):
+def test_direction_and_stride_on_straight_legs(data_root: Path, read_log):
     """Legs of 5 m and more between points of the single-floor trials; strides are fitted on floor 0 only.
 
     Measured: direction 10.0 deg (median; the phone's heading 8.8), stride 6.2 % (median, floor -2; a constant 5.9).
@@ -195,7 +194,7 @@ def test_direction_and_stride_on_straight_legs(data_root: Path):
     front_end = InertialFrontEnd()
     turned, legs = [], {"0": [], "-2": []}
     for path in sorted(folder.glob("*Trial[02]*.txt")):
-        r = read(path)
+        r = read_log(path)
         _, s = front_end.run(front_end.init(), r)
         a, q = r.acceleration, r.orientation
         attitude = q.values[np.clip(np.searchsorted(q.t, a.t, side="right") - 1, 0, None)]

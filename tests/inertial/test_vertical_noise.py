@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from made_up_vertical import gait, recording, trapezoid_speed
 
-from wayfuse.formats.reading import read
 from wayfuse.inertial import _vertical_layout as at
 from wayfuse.inertial.front_end import InertialFrontEnd
 from wayfuse.inertial.vertical_front_end import VerticalConfig, VerticalFrontEnd
@@ -93,7 +92,7 @@ def second_differences(r: Recording, lag: float) -> tuple[np.ndarray, np.ndarray
 @pytest.mark.slow
 @pytest.mark.real_data
 @pytest.mark.parametrize("lag", [2.4, 4.8])
-def test_the_law_of_the_noise_holds_on_level_walks_of_two_sets(data_root: Path, lag):
+def test_the_law_of_the_noise_holds_on_level_walks_of_two_sets(data_root: Path, read_log, lag):
     """It was measured on all of them, here on a part; it includes reading noise and drift, hence the factor 0.93."""
     logs = data_root / "ipin2023-track3" / "logs"
     walks = data_root / "ms-indoor" / "site1"
@@ -104,7 +103,7 @@ def test_the_law_of_the_noise_holds_on_level_walks_of_two_sets(data_root: Path, 
     museum = [logs / f"IPIN2023_T3_TrainingTrial{n}_repetition01.txt" for n in ("02", "05", "24")]
     mall = sorted(walks.glob("F1/path_data_files/*.txt"))[:40:2]
     for paths, low, high in ((museum, 0.6, 2.5), (mall, 1.2, 6.0)):
-        parts = [second_differences(r, lag) for r in map(read, paths) if len(r.rotation_rate)]
+        parts = [second_differences(r, lag) for r in map(read_log, paths) if len(r.rotation_rate)]
         ratio, vigour = (np.concatenate(column) for column in zip(*parts, strict=True))
         assert len(ratio) > 300
         assert low < np.median(vigour) < high

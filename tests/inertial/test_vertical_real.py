@@ -17,7 +17,6 @@ from wayfuse.evaluation.behaviours import (
     score_standing,
     true_movements,
 )
-from wayfuse.formats.reading import read
 from wayfuse.inertial.front_end import InertialFrontEnd
 from wayfuse.inertial.vertical import Behaviour, VerticalEvent
 from wayfuse.inertial.vertical_front_end import VerticalConfig, VerticalFrontEnd
@@ -38,13 +37,13 @@ def logs(data_root: Path) -> Path:
 
 
 @pytest.fixture(scope="module")
-def recordings(logs: Path) -> list[Recording]:
-    return [read(path) for path in sorted(logs.glob("*.txt"))]
+def recordings(logs: Path, read_log) -> list[Recording]:
+    return [read_log(path) for path in sorted(logs.glob("*.txt"))]
 
 
 @pytest.fixture(scope="module")
-def connectors(logs: Path) -> list[Recording]:
-    return [read(path) for path in sorted(logs.glob("*Trial5*.txt"))]
+def connectors(logs: Path, read_log) -> list[Recording]:
+    return [read_log(path) for path in sorted(logs.glob("*Trial5*.txt"))]
 
 
 def hcu(data_root: Path, name: str) -> Recording:

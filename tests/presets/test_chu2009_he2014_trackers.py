@@ -70,8 +70,7 @@ def test_the_speed_filter_is_an_option(world: Any) -> None:
 
 @pytest.mark.real_data
 @pytest.mark.slow
-def test_they_follow_a_real_walk(data_root: Path) -> None:
-    from wayfuse.evaluation.results_folds import in_turn
+def test_they_follow_a_real_walk(data_root: Path, read_log: Any) -> None:
     from wayfuse.evaluation.results_repetitions import gather, key_of
     from wayfuse.models.survey_walk import place_of
 
@@ -80,7 +79,7 @@ def test_they_follow_a_real_walk(data_root: Path) -> None:
         pytest.skip(
             f"REAL DATA ABSENT: no folder {logs}; fetch with `wayfuse datasets fetch ipin2023-track3`"
         )
-    repetitions = gather(logs, in_turn)
+    repetitions = gather(logs, lambda _, paths, __: map(read_log, paths))
     number, site = repetitions.numbers[0], repetitions.site
     of_it = [r for r in repetitions.recordings if key_of(r.name).repetition == number]
     walk = next(r for r in of_it if not key_of(r.name).changes_floors)

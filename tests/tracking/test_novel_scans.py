@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
 import numpy as np
 
 from wayfuse.filters.cloud import Cloud
+from wayfuse.inertial.vertical import Behaviour, VerticalEvent
 from wayfuse.presets.methods import build_method
 from wayfuse.radio.sparse_knn import Neighbours
+from wayfuse.tracking.engine import Known
+from wayfuse.tracking.floor_change import Movement
+from wayfuse.tracking.radio_parts import Radio
 
 
 def _near(world: Any, distance: float) -> Neighbours:
@@ -42,3 +47,28 @@ def test_a_novel_scan_is_tempered_and_its_bonus_is_not(world: Any) -> None:
         observation.log_likelihood(_cloud(1e4, 1e4, int(near.floor[0])), near, far)
         background = observation.exponent * np.log(observation.background)
         assert np.isclose(far[0] - background, observation.coverage_gain)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Asked(Radio):
+    """Keeps what it was asked."""
+
+    walks: list[bool] = field(default_factory=list)
+
+    def observed(self, novelty: float, near: Neighbours, *, walks: bool) -> Any:
+        """As of the class."""
+        self.walks.append(walks)
+        return super().observed(novelty, near, walks=walks)
+
+
+def test_novelty_counts_only_while_steps_speak(world: Any) -> None:
+    engine = build_method("fused", world.site, world.survey).engine
+    radio = Asked(**{f.name: getattr(engine.radio, f.name) for f in fields(Radio)})
+    engine = replace(engine, radio=radio)
+    scan = world.survey.fingerprint(0)
+    first = engine.on_fingerprint(engine.init("x", 0), 0.0, scan, Known())
+    walking = first._replace(n_walked=50)
+    lift = Movement(VerticalEvent(1.0, 0.5, Behaviour.LIFT, 0.4, 0.3, 0, False, np.nan, True))
+    for state in (first, walking, walking._replace(is_quiet=True), walking._replace(movement=lift)):
+        engine.on_fingerprint(state, 2.0, scan, Known())
+    assert radio.walks == [False, True, False, False]

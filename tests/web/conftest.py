@@ -145,7 +145,7 @@ class Looked:
         )
         return {track: (lon, lat, state) for track, lon, lat, state in found}
 
-    def until(self, is_so: Callable[[], Any], seconds: float = 20.0) -> None:
+    def until(self, is_so: Callable[[], Any], seconds: float = 60.0) -> None:
         """Wait until something is so, letting the page work meanwhile."""
         for _ in range(round(seconds / 0.05)):
             if is_so():
@@ -184,6 +184,7 @@ def look(browser: Any, served: Running) -> Iterator[Callable[..., Looked]]:
 
     def open_page(address: str = served.address, **options: Any) -> Looked:
         context = browser.new_context(**{"viewport": {"width": 1280, "height": 800}} | options)
+        context.set_default_timeout(60_000.0)  # other tests want the cores too
         looked = Looked(context.new_page(), address)
         looked.page.on(
             "console", lambda m: m.type in {"error", "warning"} and looked.complaints.append(m.text)

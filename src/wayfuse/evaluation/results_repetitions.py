@@ -8,8 +8,8 @@ are here once each, so no flight of stairs and no ride that is tracked was surve
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Hashable, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -73,6 +73,7 @@ class Repetitions:
     site: Site
     recordings: tuple[Recording, ...]
     walks: tuple[SurveyWalk, ...]
+    _surveys: dict[Hashable, Survey] = field(default_factory=dict, init=False, repr=False)
 
     @property
     def numbers(self) -> tuple[int, ...]:
@@ -86,7 +87,13 @@ class Repetitions:
     def survey(
         self, repetition: int, without_trial: int = 0, parameters: SurveyParameters | None = None
     ) -> Survey:
-        """Survey of all recordings of other repetitions, a trial left out if one is named."""
+        """Survey of all recordings of other repetitions, a trial left out if one is named; made once."""
+        wanted = repetition, without_trial, parameters
+        if wanted not in self._surveys:
+            self._surveys[wanted] = self._survey(repetition, without_trial, parameters)
+        return self._surveys[wanted]
+
+    def _survey(self, repetition: int, without_trial: int, parameters: SurveyParameters | None) -> Survey:
         keys = [key_of(walk.name) for walk in self.walks]
         kept = [
             walk

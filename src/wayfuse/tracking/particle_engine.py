@@ -281,7 +281,7 @@ class ParticleEngine:
         spacing: float,
     ) -> ParticleState:
         is_moving = state.movement.event is not None  # nobody is drawn afresh onto stairs or into a lift
-        walks = state.n_walked >= _UNCORROBORATED and not is_moving
+        walks = state.n_walked >= _UNCORROBORATED and not (is_moving or state.is_quiet)
         novelty, trust, observation = radio.observed(state.novelty, near, walks=walks)
         log_likelihood = np.zeros(self.n_particles)
         observation.log_likelihood(now.cloud, near, log_likelihood)

@@ -56,7 +56,7 @@ class Radio:
 
         The bonus of particles away from the survey is not tempered: it is for such scans that it is there. Nor is
         anything where steps say nothing instead (``walks`` is false): before the first of them, when only scans tell
-        the floor, and on stairs and in lifts, which are hardly ever surveyed.
+        the floor, where the motion sensors fell silent, and on stairs and in lifts, which are hardly ever surveyed.
         """
         if self.novelty is None:
             return novelty, 1.0, self.observation
