@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
 from wayfuse.core.errors import ConfigError
 from wayfuse.filters.cloud import Cloud
-from wayfuse.maps.walkable import Walkable
-from wayfuse.models.initial import Anywhere
 from wayfuse.models.observation.anchored_ranges import AnchoredRanges
 from wayfuse.radio.ap_places import ApPlaces
 from wayfuse.radio.range_line import LineGrid, Spread
 from wayfuse.sensors.records import Range
-from wayfuse.tracking.engine import Known
-from wayfuse.tracking.range_parts import Ranging
+from wayfuse.tracking.range_parts import Ranging, RangingState
 
 XY = np.array([[0.0, 0.0], [12.0, 0.0], [12.0, 8.0], [0.0, 8.0]])
 PLACES = ApPlaces(
@@ -42,9 +41,17 @@ def moment(t: float, offset: float = 0.0, slope: float = 1.0) -> list[Range]:
     return [Range(t, k + 1, offset + slope * float(d), 0.1) for k, d in enumerate(true)]
 
 
+def look(
+    parts: Ranging, state: RangingState, where: Cloud, seen: list[Range], t: float
+) -> tuple[RangingState, Any]:
+    heard = parts.moment(state, seen, t)
+    assert heard is not None
+    return parts.look(state, where, EVEN, heard)
+
+
 def test_on_the_line_of_no_error_it_is_the_gaussian() -> None:
     parts, where, seen = ranging(LINE), cloud(), moment(0.0)
-    _, found = parts.look(parts.init(), where, EVEN, seen, 0.0)
+    _, found = look(parts, parts.init(), where, seen, 0.0)
     expected = np.zeros(N)
     parts.ranges.log_likelihood(where, [r._replace(sigma=float("nan")) for r in seen], expected)
     np.testing.assert_allclose(found, expected, rtol=1e-6)
@@ -52,14 +59,14 @@ def test_on_the_line_of_no_error_it_is_the_gaussian() -> None:
 
 def test_ranges_close_in_time_and_far_anchors_say_less() -> None:
     parts, where = ranging(LINE), cloud()
-    state, first = parts.look(parts.init(), where, EVEN, moment(0.0), 0.0)
-    _, soon = parts.look(state, where, EVEN, moment(0.1), 0.1)
-    _, later = parts.look(state, where, EVEN, moment(5.0), 5.0)
+    state, first = look(parts, parts.init(), where, moment(0.0), 0.0)
+    _, soon = look(parts, state, where, moment(0.1), 0.1)
+    _, later = look(parts, state, where, moment(5.0), 5.0)
     assert first is not None
     np.testing.assert_allclose(soon, 0.2 * first)
     np.testing.assert_allclose(later, first)
     one = [moment(0.0)[0]]
-    near, far = (ranging(LINE, near=d).look(parts.init(), where, EVEN, one, 0.0)[1] for d in (100.0, 2.0))
+    near, far = (look(ranging(LINE, near=d), parts.init(), where, one, 0.0)[1] for d in (100.0, 2.0))
     np.testing.assert_allclose(far, near * 2.0 / one[0].distance)
 
 
@@ -69,7 +76,7 @@ def test_the_line_of_a_phone_is_found_between_anchors() -> None:
         parts = ranging()
         state, where = parts.init(), cloud(1.0)
         for k in range(40):
-            state, _ = parts.look(state, where, EVEN, moment(float(k), offset, slope), float(k))
+            state, _ = look(parts, state, where, moment(float(k), offset, slope), float(k))
         long = parts.lines.offsets + 7.0 * parts.lines.slopes  # of a range of 7 m, where both count
         means.append(float(np.exp(state.lines) @ long))
         assert means[-1] == pytest.approx(offset + 7.0 * slope, abs=0.4)
@@ -79,32 +86,26 @@ def test_the_line_of_a_phone_is_found_between_anchors() -> None:
 def test_unknown_anchors_teach_nothing() -> None:
     parts = ranging()
     state = parts.init()
-    after, found = parts.look(state, cloud(), EVEN, [Range(1.0, 99, 5.0)], 1.0)
-    assert after is state
-    assert found is None
+    assert parts.moment(state, [Range(1.0, 99, 5.0)], 1.0) is None
     both = [*moment(1.0)[:1], Range(1.0, 99, 5.0)]
-    some = parts.look(state, cloud(), EVEN, both, 1.0)[1]
-    np.testing.assert_array_equal(some, parts.look(state, cloud(), EVEN, both[:1], 1.0)[1])
+    some = look(parts, state, cloud(), both, 1.0)[1]
+    np.testing.assert_array_equal(some, look(parts, state, cloud(), both[:1], 1.0)[1])
 
 
-def test_a_track_begins_on_the_floor_of_the_anchors_though_the_ranges_fit_another() -> None:
+def test_what_is_heard_through_a_slab_is_rarer() -> None:
     two = {"offsets": np.zeros((2, 2)), "elevations": np.array([0.0, 4.0])}
-    ranges = AnchoredRanges(places=PLACES, **two, sigma=1.0, gain=0.3)
-    true = np.hypot(*(XY - [7.0, 3.0]).T)
-    upstairs = [Range(0.0, k + 1, float(np.hypot(d, 4.0))) for k, d in enumerate(true)]
-    upstairs.append(Range(0.0, 99, 5.0))  # of an anchor that nobody knows
-    anywhere = Anywhere(walkable=(Walkable((0.0, 0.0), 0.5, np.ones((16, 24), np.uint8)),) * 2)
-    shares = []
-    for slab in (1.0, 0.3, 0.01):
-        parts = Ranging(ranges=ranges, lines=LINE, slab=slab)
-        _, first = parts.begin(anywhere, (3, 0), 4 * N, upstairs[:1] + upstairs[-1:], 0.0, Known())
-        assert first is not None
-        shares.append(float(first.cloud.floor.mean()))
-    odds = [s / (1.0 - s) for s in shares]
-    assert odds[1] / odds[0] == pytest.approx(0.3, rel=0.2)
-    assert shares[2] < 0.02
+    where, seen = cloud(), moment(0.0)
+    below, above = where, where._replace(floor=np.ones(N, np.int32))
+    found = []
+    for slab in (1.0, 0.3):
+        parts = Ranging(
+            ranges=AnchoredRanges(places=PLACES, **two, sigma=1.0, gain=0.5, slab=slab), lines=LINE
+        )
+        found.append([look(parts, parts.init(), w, seen, 0.0)[1] for w in (below, above)])
+    np.testing.assert_array_equal(found[0][0], found[1][0])
+    np.testing.assert_allclose(found[1][1] - found[0][1], 0.5 * len(seen) * np.log(0.3))
     with pytest.raises(ConfigError, match="slab"):
-        Ranging(ranges=ranges, slab=0.0)
+        AnchoredRanges(places=PLACES, **two, slab=0.0)
 
 
 def test_what_cannot_be_is_refused() -> None:

@@ -38,6 +38,7 @@ from wayfuse.radio.range_line import LineGrid
 from wayfuse.radio.sparse_knn import SparseKnn
 from wayfuse.radio.survey import Survey
 from wayfuse.tracking.dead_reckoning import Start
+from wayfuse.tracking.elsewhere import Elsewhere
 from wayfuse.tracking.estimate import Estimate, State
 from wayfuse.tracking.floor_change import FloorChange
 from wayfuse.tracking.particle_engine import ParticleEngine, ParticleState, Recovery
@@ -105,6 +106,10 @@ class Config:
     range_slab: float = (
         0.3  # how often anchors a floor away are heard, of how often those on the same floor are
     )
+    range_floor_rate: float = (
+        0.002  # 1/s, how often somebody without barometer is on another floor, unnoticed
+    )
+    range_jump_rate: float = 0.001  # 1/s, how often somebody is anywhere else, unnoticed
     range_creep: float = 0.5  # m per root second and axis, between moments without a step
     range_lines: LineGrid = field(default_factory=LineGrid)  # how the phone measures; estimated
     map_constraint: Literal["walkable", "barriers", "none"] = "walkable"
@@ -198,13 +203,13 @@ def _ranging(site: Site, places: ApPlaces, c: Config) -> Ranging | None:
         lateness=c.range_lateness,
         gain=c.range_gain,
         near=c.range_near,
+        slab=c.range_slab,
     )
     return Ranging(
         ranges=ranges,
         lines=c.range_lines,
         creep=RandomWalk(c.range_creep) if c.range_creep > 0.0 else None,
         usual_spacing=c.range_spacing,
-        slab=c.range_slab,
     )
 
 
@@ -243,7 +248,7 @@ def _tracker(
         n_floors=len(site.floors),
         radio=radio,
         ranging=ranging,
-        anywhere=_anywhere(site, c) if ranging is not None and radio is None else None,
+        elsewhere=_elsewhere(site, c) if ranging is not None and radio is None else None,
         start=known,
         prior=prior_estimate(site),
         motion=motion,
@@ -262,9 +267,13 @@ def _tracker(
     return Tracker(engine=engine, vertical=vertical, lag=lag)
 
 
-def _anywhere(site: Site, c: Config) -> Anywhere:
+def _elsewhere(site: Site, c: Config) -> Elsewhere:
     walkable = tuple(floor.walkable for floor in site.floors)
-    return Anywhere(walkable=walkable, bias_sigma=c.first_bias_sigma, scale_sigma=c.first_scale_sigma)
+    anywhere = Anywhere(walkable=walkable, bias_sigma=c.first_bias_sigma, scale_sigma=c.first_scale_sigma)
+    offsets = np.array([site.shift(k, 0) for k in range(len(site.floors))])
+    return Elsewhere(
+        anywhere=anywhere, offsets=offsets, floor_rate=c.range_floor_rate, jump_rate=c.range_jump_rate
+    )
 
 
 def _walkable(site: Site, c: Config) -> tuple[Walkable, ...]:

@@ -20,7 +20,7 @@ from wayfuse.filters.particle_filter import (
 from wayfuse.inertial.front_end import StepEvent
 from wayfuse.inertial.vertical import VerticalEvent
 from wayfuse.maps.walkable import Walkable
-from wayfuse.models.initial import Anywhere, KnownStart
+from wayfuse.models.initial import KnownStart
 from wayfuse.models.motion.pdr import PdrMotion, StepInput
 from wayfuse.models.motion.random_walk import RandomWalk
 from wayfuse.radio.device_offset import OffsetState
@@ -28,6 +28,7 @@ from wayfuse.radio.sparse_knn import Neighbours
 from wayfuse.radio.standing import Standing
 from wayfuse.radio.survey import Fingerprint
 from wayfuse.sensors.records import Range
+from wayfuse.tracking.elsewhere import Elsewhere
 from wayfuse.tracking.engine import Known, Why, unknown
 from wayfuse.tracking.estimate import Estimate, State
 from wayfuse.tracking.fixed_lag import recalled, remembered
@@ -118,12 +119,12 @@ class ParticleEngine:
     Parameters
     ----------
     n_floors : of the site. radio : what answers scans, None = Wi-Fi is not used. ranging : what answers ranges of known
-    anchors, None = they are not used. anywhere : where a track that only ranges speak of begins, None = it waits for
-    a scan or a start. start : where the track starts, None = at the first scan; one of the two is needed. prior : the
-    estimate before. motion, constraint : of steps; constraint None = no map. diffusion : motion while no motion sensor
-    speaks. floor_change : takes the cloud over stairs and lifts, None = floors change by scans only. walkable : mask
-    per floor that estimates are kept on, empty = none. uses_steps : False = diffusion always. rotation : rad, heading
-    of building +x from east (headings arrive counter-clockwise from east).
+    anchors, None = they are not used. elsewhere : where a track that only ranges speak of is looked for, None = it
+    waits for a scan or a start. start : where the track starts, None = at the first scan; one of the two is needed.
+    prior : the estimate before. motion, constraint : of steps; constraint None = no map. diffusion : motion while no
+    motion sensor speaks. floor_change : takes the cloud over stairs and lifts, None = floors change by scans only.
+    walkable : mask per floor that estimates are kept on, empty = none. uses_steps : False = diffusion always.
+    rotation : rad, heading of building +x from east (headings arrive counter-clockwise from east).
     """
 
     n_floors: int
@@ -132,7 +133,7 @@ class ParticleEngine:
     diffusion: RandomWalk
     radio: Radio | None = None
     ranging: Ranging | None = None
-    anywhere: Anywhere | None = None
+    elsewhere: Elsewhere | None = None
     start: KnownStart | None = None
     constraint: Constraint | None = None
     filter: ParticleFilter = field(default_factory=ParticleFilter)
@@ -150,11 +151,11 @@ class ParticleEngine:
             raise ConfigError(
                 f"n_particles must be at least 10, got {self.n_particles}", where="ParticleEngine"
             )
-        if self.radio is None and self.start is None and (self.ranging is None or self.anywhere is None):
+        if self.radio is None and self.start is None and (self.ranging is None or self.elsewhere is None):
             raise ConfigError(
                 "neither a radio map nor a start nor ranges",
                 where="ParticleEngine",
-                remedy="give radio, start, or ranging with anywhere: nobody can be found by steps alone",
+                remedy="give radio, start, or ranging with elsewhere: nobody can be found by steps alone",
             )
 
     def init(self, track: str, seed: int) -> ParticleState:
@@ -248,28 +249,29 @@ class ParticleEngine:
         if self.ranging is None:
             return state
         if state.filter is None:
-            if self.anywhere is None:
+            if self.elsewhere is None:
                 return state
-            ranged, first = self.ranging.begin(self.anywhere, state.key, self.n_particles, ranges, t, known)
+            ranged, first = self.elsewhere.begin(self.ranging, state.key, self.n_particles, ranges, t, known)
             return state._replace(ranged=ranged, filter=first, moved=t)
-        now = self._crept(state, state.filter, self.ranging.creep, t)
         before = state.ranged or self.ranging.init()
-        ranged, log_likelihood = self.ranging.look(before, now.cloud, now.weights, ranges, t)
-        if log_likelihood is None:
+        moment = self.ranging.moment(before, ranges, t)
+        if moment is None:
             return state
-        after, info = self.filter.update(state.key, now, log_likelihood)
-        why = state.why._replace(n_aps=max(state.why.n_aps, len(ranges)))
-        ess = info.ess / self.n_particles
+        now, fresh, dt = state.filter, None, t - state.moved
+        if state.movement.event is None:  # on stairs and in lifts nobody creeps
+            now = self.ranging.crept(self.filter, state.key, now, dt, self.constraint)
+        if self.elsewhere is None:
+            ranged, log_likelihood = self.ranging.look(before, now.cloud, now.weights, moment)
+        else:
+            watched = self._is_watched(state, known)
+            ranged, log_likelihood, fresh = self.elsewhere.look(
+                self.ranging, state.key, before, now, moment, known, is_watched=watched
+            )
+        after, info = self.filter.update(state.key, now, log_likelihood, always_resample=fresh is not None)
+        if fresh is not None:
+            after = replace_particles(after, *fresh)
+        why, ess = state.why._replace(n_aps=max(state.why.n_aps, len(ranges))), info.ess / self.n_particles
         return state._replace(filter=after, why=why, ess=ess, ranged=ranged, moved=t)
-
-    def _crept(
-        self, state: ParticleState, now: FilterState, creep: RandomWalk | None, t: float
-    ) -> FilterState:
-        """Who makes no steps may still move, but not on stairs or in a lift."""
-        dt = t - state.moved
-        if creep is None or state.movement.event is not None or not 0.0 < dt < np.inf:
-            return now
-        return self.filter.predict(state.key, now, creep, dt, self.constraint)[0]
 
     def _weigh(
         self,
@@ -292,13 +294,15 @@ class ParticleEngine:
         contradicts = agreement < self.recovery.agreement and not is_moving
         contradictions = state.contradictions + 1 if contradicts else 0
         if not is_moving:
-            keeps = self.floor_change is not None and known.height and state.n_walked >= _UNCORROBORATED
             share, keeps_floor = self._renewal(contradictions, agreement, trust)
-            after = self._renewed(
-                state.key, after, radio, near, share, known, keeps_floor=keeps and keeps_floor
-            )
+            keeps_floor = keeps_floor and self._is_watched(state, known)
+            after = self._renewed(state.key, after, radio, near, share, known, keeps_floor=keeps_floor)
         ess = info.ess / self.n_particles
         return state._replace(filter=after, contradictions=contradictions, ess=ess, novelty=novelty)
+
+    def _is_watched(self, state: ParticleState, known: Known) -> bool:
+        """Whether a change of floors would not go unnoticed."""
+        return self.floor_change is not None and known.height and state.n_walked >= _UNCORROBORATED
 
     def estimate(self, state: ParticleState, t: float) -> tuple[ParticleState, Estimate]:
         """Geometric median on the heaviest floor, with radii."""

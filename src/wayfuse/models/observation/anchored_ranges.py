@@ -10,7 +10,9 @@ never hastens it: the tail is one-sided. With :math:`\epsilon = 0` and :math:`\g
 They sum to 1, so a range says the less the more anchors answer at its moment, and a lone one says all. Where ranges
 come one by one as well as together, `AnchoredRanges.table` has exponents without a sum: 1 up to the distance ``near``,
 and near/d beyond. It also has the phone's line (r_j is offset + slope * distance, `radio.range_line`), and looks at no
-deviation that a record states: phones state the scatter of a burst, and walls make the errors.
+deviation that a record states: phones state the scatter of a burst, and walls make the errors. And it takes into
+account that an anchor is heard at all, which is rarer by a factor of ``slab`` through each slab of concrete: ranges of
+some metres and more hardly differ from floor to floor.
 
 References
 ----------
@@ -54,7 +56,8 @@ class AnchoredRanges:
     first. elevations : (n_floors,) m. sigma : m, standard deviation of a range without a wall between; where a record
     states its own, the two add up in squares. late : epsilon, share of ranges that come late. lateness : mu, m.
     exponents : how ranges are weighed against each other. gain : gamma, tempering, for the errors of ranges of one
-    place are alike from moment to moment. phone_height : m above the floor. near : m, of `table`.
+    place are alike from moment to moment. phone_height : m above the floor. near : m, of `table`. slab : of `table`,
+    how often an anchor one floor away is heard, of how often one on the same floor is.
     """
 
     places: ApPlaces
@@ -67,6 +70,7 @@ class AnchoredRanges:
     gain: float = 1.0
     phone_height: float = 1.2
     near: float = math.inf
+    slab: float = 1.0
 
     def __post_init__(self) -> None:
         if not (min(self.sigma, self.lateness, self.gain, self.near) > 0.0 and 0.0 <= self.late < 1.0):
@@ -74,6 +78,8 @@ class AnchoredRanges:
                 "sigma, lateness, gain and near must be positive, late a share below 1",
                 where="AnchoredRanges",
             )
+        if not 0.0 < self.slab <= 1.0:
+            raise ConfigError("slab must be a share above 0", where="AnchoredRanges")
         if len(self.offsets) != len(self.elevations):
             raise ConfigError("offsets and elevations of different floors", where="AnchoredRanges")
         if len(self.places) and int(self.places.floor.max()) >= len(self.elevations):
@@ -121,6 +127,9 @@ class AnchoredRanges:
         for row, z, exponent in zip(rows.tolist(), measured.tolist(), exponents.tolist(), strict=True):
             late_by = (z - offsets)[:, None] - np.outer(slopes, self._distance(row, *places))
             out += exponent * self._log_density(late_by, self.sigma)
+        if len(self.elevations) > 1:
+            slabs = np.abs(self.places.floor[rows][:, None] - cloud.floor)
+            out += self.gain * math.log(self.slab) * (gains @ slabs)
         return out
 
     def _places(self, cloud: Cloud) -> tuple[Array, Array, Array]:
