@@ -103,12 +103,8 @@ class Config:
     range_gain: float = 0.3  # tempering: errors of successive ranges of an anchor are much alike
     range_spacing: float = 0.5  # s between ranges of an anchor; closer ones say less
     range_near: float = 4.0  # m; ranges beyond say less, in proportion
-    range_slab: float = (
-        0.3  # how often anchors a floor away are heard, of how often those on the same floor are
-    )
-    range_floor_rate: float = (
-        0.002  # 1/s, how often somebody without barometer is on another floor, unnoticed
-    )
+    range_slab: float = 0.3  # how often anchors a floor away are heard, of those on the same floor
+    range_floor_rate: float = 0.002  # 1/s, how often somebody changes floors unnoticed
     range_jump_rate: float = 0.001  # 1/s, how often somebody is anywhere else, unnoticed
     range_creep: float = 0.5  # m per root second and axis, between moments without a step
     range_lines: LineGrid = field(default_factory=LineGrid)  # how the phone measures; estimated

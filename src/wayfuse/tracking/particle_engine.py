@@ -257,10 +257,10 @@ class ParticleEngine:
         moment = self.ranging.moment(before, ranges, t)
         if moment is None:
             return state
-        now, fresh, dt = state.filter, None, t - state.moved
-        if state.movement.event is None:  # on stairs and in lifts nobody creeps
-            now = self.ranging.crept(self.filter, state.key, now, dt, self.constraint)
-        if self.elsewhere is None:
+        now, fresh, is_moving = state.filter, None, state.movement.event is not None
+        if not is_moving:  # on stairs and in lifts nobody creeps, nor is drawn afresh
+            now = self.ranging.crept(self.filter, state.key, now, t - state.moved, self.constraint)
+        if self.elsewhere is None or is_moving:
             ranged, log_likelihood = self.ranging.look(before, now.cloud, now.weights, moment)
         else:
             watched = self._is_watched(state, known)
