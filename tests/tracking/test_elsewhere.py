@@ -108,9 +108,7 @@ def _parts(n_floors: int = 2, **more: Any) -> tuple[Ranging, Elsewhere]:
     )
     mask = np.ones((48, 80), np.uint8)
     walkable = tuple(Walkable(tuple((-shift).tolist()), 0.5, mask) for shift in offsets)
-    return Ranging(ranges=ranges, lines=LINE), Elsewhere(
-        anywhere=Anywhere(walkable=walkable), offsets=offsets, **more
-    )
+    return Ranging(ranges=ranges, lines=LINE), Elsewhere(anywhere=Anywhere(walkable=walkable), **more)
 
 
 def _at(x: float, y: float, floor: int) -> FilterState:

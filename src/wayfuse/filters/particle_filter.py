@@ -154,6 +154,12 @@ class ParticleFilter:
         return after, FilterInfo(ess, evidence, resampled=True, n_blocked=0)
 
 
+def spread_slots(noise: Noise, n: int, fresh: int) -> NDArray[np.int64]:
+    """Distinct slots (fresh,) of n equally weighted particles to replace: a random start and an even stride."""
+    start = noise.uniforms(1)[0, 0] * n
+    return np.asarray(np.floor(start + np.arange(fresh) * (n / fresh)).astype(np.int64) % n)
+
+
 def replace_particles(state: FilterState, slots: NDArray[np.integer], fresh: Cloud) -> FilterState:
     """Put fresh particles into slots; their past is where they are now, for they have none."""
     columns: list[NDArray[Any]] = [

@@ -266,10 +266,7 @@ def _tracker(
 def _elsewhere(site: Site, c: Config) -> Elsewhere:
     walkable = tuple(floor.walkable for floor in site.floors)
     anywhere = Anywhere(walkable=walkable, bias_sigma=c.first_bias_sigma, scale_sigma=c.first_scale_sigma)
-    offsets = np.array([site.shift(k, 0) for k in range(len(site.floors))])
-    return Elsewhere(
-        anywhere=anywhere, offsets=offsets, floor_rate=c.range_floor_rate, jump_rate=c.range_jump_rate
-    )
+    return Elsewhere(anywhere=anywhere, floor_rate=c.range_floor_rate, jump_rate=c.range_jump_rate)
 
 
 def _walkable(site: Site, c: Config) -> tuple[Walkable, ...]:

@@ -26,7 +26,7 @@ from wayfuse.core.errors import ConfigError
 from wayfuse.core.philox import Noise
 from wayfuse.core.types import Array, BoolArray
 from wayfuse.filters.cloud import NO_CONNECTOR, Cloud
-from wayfuse.filters.particle_filter import FilterState
+from wayfuse.filters.particle_filter import FilterState, spread_slots
 from wayfuse.filters.resampling import systematic
 from wayfuse.models.initial import Anywhere
 from wayfuse.sensors.records import Range
@@ -62,13 +62,11 @@ class Elsewhere:
 
     Parameters
     ----------
-    anywhere : draws places all over the building. offsets : (n_floors, 2) m, a place on floor k plus ``offsets[k]`` is
-    in the frame of the first. floor_rate, jump_rate : 1/s, how often somebody is on another floor, and anywhere,
-    unnoticed. every : s between looks. most : share of the particles that one look may draw afresh.
+    anywhere : draws places all over the building. floor_rate, jump_rate : 1/s, how often somebody is on another floor,
+    and anywhere, unnoticed. every : s between looks. most : share of the particles that one look may draw afresh.
     """
 
     anywhere: Anywhere
-    offsets: Array
     floor_rate: float = 0.002
     jump_rate: float = 0.001
     every: float = 1.0
@@ -117,30 +115,16 @@ class Elsewhere:
             return after, log_likelihood, None
         noise = Noise((key[0] ^ _OWN, key[1]), state.looks)
         mine = ranging.at_best_line(state, now.cloud, moment)
-        proposals = self._proposals(noise, ranging, state, now, moment, known, is_watched=is_watched)
-        fresh = self._drawn(noise, weights, mine, proposals, min(dt, _LONGEST))
-        return after._replace(looked=moment.t, looks=noise.draw), log_likelihood, fresh
-
-    def _proposals(
-        self,
-        noise: Noise,
-        ranging: Ranging,
-        state: RangingState,
-        now: FilterState,
-        moment: Moment,
-        known: Known,
-        *,
-        is_watched: bool,
-    ) -> list[_Proposal]:
         places = self.anywhere.draw(noise, now.cloud.n, heading_known=known.heading)
-        out = [_Proposal(self.jump_rate, places, ranging.at_best_line(state, places, moment))]
+        proposals = [_Proposal(self.jump_rate, places, ranging.at_best_line(state, places, moment))]
         floors = np.unique(ranging.ranges.places.floor)
         if len(floors) > 1 and not is_watched:
-            other, is_there = self._other_floors(noise, now.cloud, floors)
+            other, is_there = self._other_floors(noise, now.cloud, floors, ranging.ranges.offsets)
             there = np.where(is_there, ranging.at_best_line(state, other, moment), -np.inf)
             with np.errstate(divide="ignore"):
-                out.append(_Proposal(self.floor_rate, other, there + np.log(now.cloud.n * now.weights)))
-        return out
+                proposals.append(_Proposal(self.floor_rate, other, there + np.log(now.cloud.n * weights)))
+        fresh = self._drawn(noise, weights, mine, proposals, min(dt, _LONGEST))
+        return after._replace(looked=moment.t, looks=noise.draw), log_likelihood, fresh
 
     def _drawn(
         self, noise: Noise, weights: Array, mine: Array, proposals: Sequence[_Proposal], dt: float
@@ -156,15 +140,14 @@ class Elsewhere:
         ]
         if not chosen:
             return None
-        clouds = [p.cloud.take(systematic(noise, _normalised(p.log_p), k)) for p, k in chosen]
+        clouds = [
+            p.cloud.take(systematic(noise, FilterState(p.cloud, p.log_p, 0).weights, k)) for p, k in chosen
+        ]
         fresh = Cloud(*(np.concatenate(columns) for columns in zip(*clouds, strict=True)))
-        # distinct slots: a random start and an even stride over particles that are then of equal weight
-        start = noise.uniforms(1)[0, 0] * n
-        slots = np.floor(start + np.arange(fresh.n) * (n / fresh.n)).astype(np.int64) % n
-        return Fresh(slots, fresh)
+        return Fresh(spread_slots(noise, n, fresh.n), fresh)
 
     def _other_floors(
-        self, noise: Noise, cloud: Cloud, floors: NDArray[np.integer]
+        self, noise: Noise, cloud: Cloud, floors: NDArray[np.integer], offsets: Array
     ) -> tuple[Cloud, BoolArray]:
         """The same particles on another of the floors that have anchors, and which of them can be there, (N,).
 
@@ -174,14 +157,9 @@ class Elsewhere:
         at = np.searchsorted(floors, cloud.floor).clip(0, len(floors) - 1)
         is_there = (floors[at] == cloud.floor) & (cloud.connector == NO_CONNECTOR)
         other = floors[(at + 1 + (u * (len(floors) - 1)).astype(np.int64)) % len(floors)]
-        shift = self.offsets[cloud.floor] - self.offsets[other]
+        shift = offsets[cloud.floor] - offsets[other]
         x, y = (cloud.x + shift[:, 0]).astype(np.float32), (cloud.y + shift[:, 1]).astype(np.float32)
         for floor in floors.tolist():
             on = other == floor
             is_there[on] &= self.anywhere.walkable[floor].contains(x[on], y[on])
         return cloud._replace(x=x, y=y, floor=other.astype(np.int32)), is_there
-
-
-def _normalised(log_p: Array) -> Array:
-    p = np.exp(log_p - log_p.max())
-    return np.asarray(p / p.sum())

@@ -16,6 +16,7 @@ from wayfuse.filters.particle_filter import (
     ParticleFilter,
     Snapshot,
     replace_particles,
+    spread_slots,
 )
 from wayfuse.inertial.front_end import StepEvent
 from wayfuse.inertial.vertical import VerticalEvent
@@ -366,9 +367,7 @@ class ParticleEngine:
             return state
         noise = Noise(key, state.draw)
         fresh = radio.first.draw(noise, near, n, heading_known=known.heading)
-        # distinct slots: a random start and an even stride over the resampled (hence equally weighted) particles
-        start = noise.uniforms(1)[0, 0] * self.n_particles
-        slots = (np.floor(start + np.arange(n) * (self.n_particles / n)).astype(np.int64)) % self.n_particles
+        slots = spread_slots(noise, self.n_particles, n)  # of resampled particles
         if keeps_floor:  # the place is the scan's, the floor stays
             fresh = fresh._replace(floor=state.cloud.floor[slots])
         return replace_particles(state._replace(draw=noise.draw), slots, fresh)

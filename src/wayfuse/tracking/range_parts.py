@@ -109,7 +109,7 @@ class Ranging:
 
     def crept(
         self,
-        filter: ParticleFilter,  # noqa: A002 (as the engine calls it)
+        particle_filter: ParticleFilter,
         key: tuple[int, int],
         now: FilterState,
         dt: float,
@@ -118,4 +118,4 @@ class Ranging:
         """The particles ``dt`` seconds after they last moved: who makes no steps may still move."""
         if self.creep is None or not 0.0 < dt < np.inf:
             return now
-        return filter.predict(key, now, self.creep, dt, constraint)[0]
+        return particle_filter.predict(key, now, self.creep, dt, constraint)[0]
