@@ -125,7 +125,7 @@ def test_a_server_killed_again_and_again(
     options: tuple[object, ...] = ()
     if kind == "postgresql":
         options = ("--database", create_database(request.getfixturevalue("postgres"), "crash"))
-    _check(world, tmp_path / "data", *options, kills=3, n_phones=3)
+    _check(world, tmp_path / "data", *options, kills=4, n_phones=6)
 
 
 def test_a_stream_goes_on_over_a_crash(world: Any, tmp_path: Path) -> None:

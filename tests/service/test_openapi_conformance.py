@@ -23,7 +23,7 @@ from wayfuse.service.routes.examples import EXAMPLES
 _NOT_CHECKED = [positive_data_acceptance, negative_data_rejection, ignored_auth]
 _PUBLIC = {"/health"}
 _FEW = settings(max_examples=4, deadline=None, suppress_health_check=list(HealthCheck), derandomize=True)
-_MANY = settings(max_examples=16, deadline=None, suppress_health_check=list(HealthCheck), derandomize=True)
+_MANY = settings(max_examples=30, deadline=None, suppress_health_check=list(HealthCheck), derandomize=True)
 
 
 @pytest.fixture(scope="module")
